@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 import paraflex as pf
 from paraflex.integrators import METHODS, IntegrationOptions, Solution, find_method
-from paraflex.integrators.outside import StiffnessWarning
+from paraflex.integrators.external_run import StiffnessWarning
 from paraflex.studies.cases import tracking_case
 
 SETTINGS = {

@@ -23,7 +23,7 @@ from paraflex.errors import IntegrationError
 from paraflex.fem import ReferenceCondition
 from paraflex.files import Model
 from paraflex.integrators import IntegrationOptions
-from paraflex.mechanism import Curvature, FlexibleBeam, Geometry, JointFriction, Mechanism, PiecewiseLaw
+from paraflex.mechanism import Curvature, FlexibleBeam, Geometry, JointFriction, Mechanism, PiecewiseProfile
 from paraflex.studies import Case, ComparisonOptions, compare_methods, motion_case, tracking_case
 
 METHODS = ("tr-bdf2", "esdirk3", "esdirk4", "esdirk5")
@@ -84,7 +84,7 @@ class Quadratic:
 def jerked(mechanism: Mechanism) -> Mechanism:
     """Turned faster, evenly, slower and not at all, each for 4 s or more: the acceleration jumps."""
     pieces = Quadratic(0, 0, 0.5, 0), Quadratic(4, 2, 0, 4), Quadratic(12, 2, -0.5, 8), Quadratic(16, 0, 0, 12)
-    spin = replace(mechanism.prescribed[0], law=PiecewiseLaw(pieces, (4.0, 8.0, 12.0)))
+    spin = replace(mechanism.prescribed[0], profile=PiecewiseProfile(pieces, (4.0, 8.0, 12.0)))
     return replace(mechanism, prescribed=(spin,))
 
 

@@ -176,7 +176,7 @@ def classes() -> list[Subject]:
         pf.JointLimit("A1", 0.0, 1.0),
         pf.Tachometer("s", "A1"), pf.SingularDistance(0.1), pf.DeflectionLimit("link1", 1e-3), pf.Actuator("A1"),
         pf.AppliedTorque("a", point, 1.0), pf.PointForce("a", point, (1.0, 0.0)), pf.ConstantSpeed(0.0, 1.0),
-        pf.PiecewiseLaw((pf.ConstantSpeed(0.0, 1.0),), ()), pf.TabulatedLaw((0.0, 1.0), (0.0, 1.0)),
+        pf.PiecewiseProfile((pf.ConstantSpeed(0.0, 1.0),), ()), pf.TabulatedProfile((0.0, 1.0), (0.0, 1.0)),
         pf.Payload(1.0), pf.StrainGauge("g", "link1", 0.5), pf.DeflectionSensor("d", point, "x"),
         pf.AccelerationSensor("a", point, "x"), pf.JointForceSensor("f", "A1", "x"), pf.LossFactor(0.01, 100.0),
         pf.SlotJoint("s", point, point), pf.SumRelation("s", {"A1": 1.0, "D1": 1.0}),

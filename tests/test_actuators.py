@@ -376,7 +376,7 @@ def test_raparm_with_servos_runs_under_a_controller(square):
     assert record.current == pytest.approx(run.applied / 1.0, rel=1e-12)
     assert np.max(np.abs(record.voltage)) < 48.0
     assert np.max(np.abs(run.applied)) < 8.0
-    assert not [one for one in run.doubts if one.code.startswith(("amplifier", "back-emf"))]
+    assert not [one for one in run.findings if one.code.startswith(("amplifier", "back-emf"))]
     # Without them links bend beyond all theory in the end, where rounding lets them.
     try:
         bare = driven(square.remodelled(replace(square.mechanism, actuators=())))
@@ -387,7 +387,7 @@ def test_raparm_with_servos_runs_under_a_controller(square):
 
 def test_what_motors_cannot_give_is_found(square):
     weak = replace(square.mechanism, actuators=(replace(SERVO, current_limit=1.0, voltage_limit=3.0),))
-    doubts = pf.simulate(square.remodelled(weak), "++++", warning=False).doubts
+    doubts = pf.simulate(square.remodelled(weak), "++++", warning=False).findings
     found = [(one.code, one.place) for one in doubts if one.code == "amplifier-beyond"]
     assert ("amplifier-beyond", "actuator.servo.current_limit") in found
     assert ("amplifier-beyond", "actuator.servo.voltage_limit") in found
@@ -397,7 +397,7 @@ def test_back_emf_that_comes_late_or_unasked_is_found(square):
     slow = replace(SERVO, amplifier="voltage", bandwidth=None, voltage_limit=None, current_limit=None)
     task = square.remodelled(replace(square.mechanism, actuators=(slow,)))
     run = pf.simulate(task, "+-+-", warning=False)
-    found = {one.code: one for one in run.doubts}
+    found = {one.code: one for one in run.findings}
     assert found["back-emf-passive"].text.startswith("motor tau6 is passive")
     late = re.search(r"L/R = 0.5 ms would delay up to ([\d.]+) of ([\d.]+)", found["back-emf-late"].text)
     assert late
@@ -405,7 +405,7 @@ def test_back_emf_that_comes_late_or_unasked_is_found(square):
     assert float(late[2]) == pytest.approx(np.max(np.abs(run.electrical.torque[:, k])), rel=1e-2)
     quick = replace(slow, inductance=0.0)
     task = square.remodelled(replace(square.mechanism, actuators=(quick,)))
-    codes = {one.code for one in pf.simulate(task, "++++", warning=False).doubts}
+    codes = {one.code for one in pf.simulate(task, "++++", warning=False).findings}
     assert not codes & {"back-emf-passive", "back-emf-late"}
 
 

@@ -184,7 +184,7 @@ def coordinate(system, name, q):
 
 
 def row_values(system, t, q):
-    """What every row compares with zero or with its multiplier: values of joints, less laws and rest values."""
+    """What every row compares with zero or with its multiplier: values of joints, less profiles and rest values."""
     out = {}
     for joint in system.mechanism.joints:
         gap = place(system, joint.b, q) - place(system, joint.a, q)
@@ -199,8 +199,8 @@ def row_values(system, t, q):
     mechanism = system.mechanism
     for member in (*mechanism.prescribed, *mechanism.springs, *mechanism.dampers, *mechanism.frictions):
         value = coordinate(system, member.joint, q) - getattr(member, "rest", 0.0)
-        if hasattr(member, "law"):
-            value = value - member.law.evaluate(np.array([t]))[0][0]
+        if hasattr(member, "profile"):
+            value = value - member.profile.evaluate(np.array([t]))[0][0]
         out[f"{member.name} travel"] = out[f"{member.name} angle"] = value
     for gear in mechanism.gears:
         first, second = (coordinate(system, name, q) for name in gear.joints)
@@ -266,9 +266,9 @@ def test_constraints_their_rate_and_jacobian(sliders):
     expected = numeric_jacobian(sliders, q)
     scale = np.max(np.abs(expected))
     np.testing.assert_allclose(sliders.jacobian(q)[rigid], expected[rigid], rtol=0, atol=1e-13 * scale)
-    law = np.zeros(sliders.m)
-    law[sliders.rows.index("drive travel")] = 0.4 * TIME - 1
-    np.testing.assert_allclose(rate[rigid], (expected @ v - law)[rigid], rtol=0, atol=1e-9)
+    profile = np.zeros(sliders.m)
+    profile[sliders.rows.index("drive travel")] = 0.4 * TIME - 1
+    np.testing.assert_allclose(rate[rigid], (expected @ v - profile)[rigid], rtol=0, atol=1e-9)
 
 
 def test_acceleration_rows_are_second_derivatives_along_a_motion(sliders):
@@ -285,9 +285,9 @@ def test_acceleration_rows_are_second_derivatives_along_a_motion(sliders):
     h = 1e-4
     d = {k: np.imag(value(k * h + 1e-30j)) / 1e-30 for k in (-2, -1, 1, 2)}
     second = (d[-2] - 8 * d[-1] + 8 * d[1] - d[2]) / (12 * h)
-    law = np.zeros((2, sliders.m))
-    law[:, sliders.rows.index("drive travel")] = 0.4 * TIME - 1, 0.4
-    expected = weight_a * (second - law[1]) + weight_v * (first - law[0]) + weight_q * value(0.0)
+    profile = np.zeros((2, sliders.m))
+    profile[:, sliders.rows.index("drive travel")] = 0.4 * TIME - 1, 0.4
+    expected = weight_a * (second - profile[1]) + weight_v * (first - profile[0]) + weight_q * value(0.0)
     rigid = kinds(sliders, CONSTRAINT)
     np.testing.assert_allclose(rows[rigid], expected[rigid], rtol=1e-8, atol=1e-7)
 
@@ -412,13 +412,13 @@ def test_dry_friction_brakes_a_block_and_holds_it_below_its_limit():
     # Once it slides, the drive less the limit is left; below the limit it creeps at the speed that balances.
     drive = 2.0 * G * np.sin(0.5)
 
-    def law(t, state):
+    def profile(t, state):
         return [state[1], (drive - 4.0 * np.tanh(state[1] / 1e-3)) / 2.0]
 
     sliding = block_on_incline(frictions=(JointFriction("dry", "rail", 4.0, 1e-3),))
     run = simulate_motion(sliding, 0.5, samples=11, options=EXACT)
     travel = joint_coordinate(run.system, "rail", run.solution.q).value
-    exact = scipy.integrate.solve_ivp(law, (0, 0.5), [0, 0], "LSODA", run.times, rtol=1e-11, atol=1e-13).y
+    exact = scipy.integrate.solve_ivp(profile, (0, 0.5), [0, 0], "LSODA", run.times, rtol=1e-11, atol=1e-13).y
     np.testing.assert_allclose(travel, exact[0], rtol=0, atol=1e-6)
     np.testing.assert_allclose(exact[0], 0.5 * (drive - 4.0) / 2.0 * run.times**2, rtol=0, atol=3e-4)
     assert run.solution.work[-1] == pytest.approx(0.5 * 2.0 * exact[1, -1] ** 2, rel=1e-4)
@@ -540,10 +540,10 @@ def test_a_mass_hung_on_a_beam_slides_where_the_beam_bends():
 
 
 def test_a_prescribed_travel_is_kept():
-    law = SampledAngle(
+    profile = SampledAngle(
         lambda t: 0.1 * np.sin(7 * t), lambda t: 0.7 * np.cos(7 * t), lambda t: -4.9 * np.sin(7 * t)
     )  # fmt: skip
-    mechanism = block_on_incline(prescribed=(PrescribedAngle("wave", "rail", law),))
+    mechanism = block_on_incline(prescribed=(PrescribedAngle("wave", "rail", profile),))
     run = simulate_motion(mechanism, 1.0, samples=31, options=EXACT)
     travel = joint_coordinate(run.system, "rail", run.solution.q).value
     np.testing.assert_allclose(travel, 0.1 * np.sin(7 * run.times), rtol=0, atol=1e-6)

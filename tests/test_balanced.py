@@ -42,7 +42,7 @@ from paraflex.mechanism import (
     RevoluteJoint,
     SampledAngle,
     Section,
-    TabulatedLaw,
+    TabulatedProfile,
     TorsionalDamper,
     finite_segments,
     raparm_i,
@@ -115,7 +115,7 @@ def test_a_turning_crank_does_not_ring_from_there():
 
 
 def test_a_four_bar_starts_in_motion_and_hardly_vibrates():
-    """The pose of balance at 20 rad/s: rows to rounding, the law's rate, and strain energy near that of balance."""
+    """The pose of balance at 20 rad/s: rows to rounding, the profile's rate, and strain energy near that of balance."""
     mechanism = load("four_bar").mechanism
     system, undeformed, state = start_of(mechanism)
     (position, velocity, acceleration), size = violations(system, state)
@@ -316,12 +316,12 @@ def test_a_four_bar_runs_balanced_to_its_end(tmp_path):
 @pytest.mark.parametrize("interpolation", ["linear", "spline"])
 def test_a_moving_balanced_start_takes_a_load_table_that_begins_with_the_run(interpolation):
     """A force that grows linearly, as a table from t = 0 on and as functions of any time."""
-    table = TabulatedLaw((0.0, 1.0), (2.0, 12.0), interpolation)
+    table = TabulatedProfile((0.0, 1.0), (2.0, 12.0), interpolation)
     anytime = SampledAngle(lambda t: 2.0 + 10.0 * t, lambda t: 10.0 + 0.0 * t, lambda t: 0.0 * t)
     tip = PointRef("crank", "P")
     found, same = (
-        start_of(dataclasses.replace(turning_crank(4.0), loads=(PointForce("push", tip, (0.0, law)),)))[2]
-        for law in (table, anytime)
+        start_of(dataclasses.replace(turning_crank(4.0), loads=(PointForce("push", tip, (0.0, profile)),)))[2]
+        for profile in (table, anytime)
     )
     assert found.q == pytest.approx(same.q, rel=1e-9, abs=1e-12)
     assert found.v == pytest.approx(same.v, rel=1e-6, abs=1e-9)

@@ -235,10 +235,10 @@ def test_elastodynamics_stops_or_goes_on_where_the_joint_says():
     # What the mechanism does at the end stands between its neighbours.
     low, high = np.sort(gone_on.solution.q[k - 1 : k + 1], axis=0)
     assert np.all((solution.q[k] >= low - 1e-6) & (solution.q[k] <= high + 1e-6))
-    assert stopped.doubts == ()
+    assert stopped.findings == ()
     (figures,) = summary(tracking_dataset([stopped]))["modes"].values()
     assert figures["event_time"] == solution.t[-1]
-    assert [one.code for one in gone_on.doubts] == ["slider-off-beam"]
+    assert [one.code for one in gone_on.findings] == ["slider-off-beam"]
     with pytest.raises(InputError, match="its point is off the beam at the start"):
         simulate_ked(
             plan_tracking(driven("stop"), Line((0.25, 0.0), (BASE + CRANK * np.cos(START), 0.0), 10.0), samples=51),

@@ -12,7 +12,7 @@ import paraflex as pf
 from flexures import LEAF, LENGTH, STEEL, guide, pivot
 from paraflex.dynamics import build_system
 from paraflex.elastodynamics import simulate_ked
-from paraflex.files import ExpressionLaw
+from paraflex.files import ExpressionProfile
 from paraflex.mechanism import BodyValues, Deflection, Start, in_frames
 from paraflex.results import motion_dataset, tracking_dataset
 from shell import paraflex
@@ -87,9 +87,9 @@ def test_a_run_whose_energy_does_not_balance_says_so():
     model = pf.load("leaf_spring_guide")
     with pytest.warns(pf.ResultWarning, match="energy and work do not balance"):
         run = pf.simulate_motion(model, 0.1, samples=51, options=pf.IntegrationOptions(tolerance=1e-3))
-    assert any(one.code == "energy-unbalanced" for one in run.doubts)
+    assert any(one.code == "energy-unbalanced" for one in run.findings)
     other = pf.simulate_motion(model, 0.1, samples=51)
-    assert not any(one.code == "energy-unbalanced" for one in other.doubts)
+    assert not any(one.code == "energy-unbalanced" for one in other.findings)
 
 
 @pytest.mark.parametrize("geometry", ["linear", "second-order"])
@@ -130,7 +130,7 @@ def test_stiff_frames_follow_a_slow_load_as_in_statics(duration, frames, steps):
     """However little is left of redundant rows in steps thousands of periods long."""
     thick = pf.load("leaf_spring_guide", set={"section.leaf.thickness": 0.01}).mechanism
     peak, push = 16000.0, thick.loads[0]
-    slow = replace(push, force=(ExpressionLaw(f"{peak} * sin(pi * t / {duration})**2"), 0.0))
+    slow = replace(push, force=(ExpressionProfile(f"{peak} * sin(pi * t / {duration})**2"), 0.0))
     guide = framed(replace(thick, loads=(slow,)), frames)
     run = pf.simulate_motion(guide, duration, samples=3, warning=False)
     at_peak = motion_dataset(run)["point_position"].sel(point="stage.T").isel(time=1)

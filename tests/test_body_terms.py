@@ -172,13 +172,13 @@ def test_residuals_are_those_of_the_index_1_equations(system, alpha, beta):
     f = twins.system_mass_matrix(system, q) @ a + twins.system_forces(system, q, v) + J.T @ lam - torques @ motors
     np.testing.assert_allclose(ws.f, f, rtol=0, atol=1e-11 * np.max(np.abs(f)))
 
-    law = np.zeros((3, system.m))
+    profile = np.zeros((3, system.m))
     for prescribed in system.mechanism.prescribed:
         row = system.rows.index(f"{prescribed.name} angle")
-        law[:, row] = [x[0] for x in prescribed.law.evaluate(np.array([t]))]
-    second = twins.along(lambda q: twins.constraint_jacobian(system, q) @ v, q, v) + J @ a - law[2]
-    rows = second + 2 * alpha * (J @ v - law[1]) + beta**2 * twins.constraints(system, t, q)
-    # A prescribed law's second derivative comes from quintic pieces: 1e-8, see test_joints.
+        profile[:, row] = [x[0] for x in prescribed.profile.evaluate(np.array([t]))]
+    second = twins.along(lambda q: twins.constraint_jacobian(system, q) @ v, q, v) + J @ a - profile[2]
+    rows = second + 2 * alpha * (J @ v - profile[1]) + beta**2 * twins.constraints(system, t, q)
+    # A prescribed profile's second derivative comes from quintic pieces: 1e-8, see test_joints.
     np.testing.assert_allclose(ws.rows, rows, rtol=0, atol=1e-12 * np.max(np.abs(rows)) + 1e-8)
 
 

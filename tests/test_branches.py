@@ -57,7 +57,7 @@ def angles_of(lengths, crank, side):
     return crank, coupler, np.angle(pin_a + b * np.exp(1j * coupler) - ground)
 
 
-def four_bar(lengths, crank, side, law, **changes):
+def four_bar(lengths, crank, side, profile, **changes):
     angles = dict(zip(("crank", "coupler", "rocker"), angles_of(lengths, crank, side), strict=True))
     given = {
         "ground": {"O": (0.0, 0.0), "D": (lengths[0], 0.0)},
@@ -65,7 +65,7 @@ def four_bar(lengths, crank, side, law, **changes):
                    body("rocker", lengths[3], "D", "B")),
         "joints": (pin("O", "ground.O", "crank.O"), pin("A", "crank.A", "coupler.A"),
                    pin("B", "coupler.B", "rocker.B"), pin("D", "ground.D", "rocker.D")),
-        "prescribed": () if law is None else (PrescribedAngle("drive", "O", law),),
+        "prescribed": () if profile is None else (PrescribedAngle("drive", "O", profile),),
         "assemblies": (Assembly("above", angles),),
     }  # fmt: skip
     return Mechanism("four-bar", **(given | changes))
@@ -127,7 +127,7 @@ def test_a_drive_that_starts_elsewhere_stays_on_the_branch_of_the_assembly(lengt
 
 @pytest.mark.parametrize("turns", [-3, -1, 1, 2, 1000])
 @pytest.mark.parametrize(("lengths", "crank", "side", "_"), list(random_four_bars(4)))
-def test_a_law_whole_turns_ahead_has_the_pose_of_the_assembly(lengths, crank, side, _, turns):
+def test_a_profile_whole_turns_ahead_has_the_pose_of_the_assembly(lengths, crank, side, _, turns):
     mechanism = four_bar(lengths, crank, side, ConstantSpeed(crank + 2.0 * np.pi * turns, 1.0))
     found = found_angles(mechanism, consistent_state(build_system(mechanism), None).q)
     assert found - angles_of(lengths, crank, side) == pytest.approx([2.0 * np.pi * turns, 0.0, 0.0], abs=1e-8)
@@ -249,7 +249,7 @@ def test_a_drive_without_a_start_begins_where_the_assembly_stands(two_assemblies
     turn, lift = EXPECTED[name]
     assert found == pytest.approx(np.array([[turn, lift], [turn + 0.5, lift], [turn + 1.0, lift]]), abs=1e-9)
     chosen = pf.load(two_assemblies, set={"study.assembly": name}).mechanism
-    assert [one.law for one in chosen.prescribed] == [ConstantSpeed(turn, 2.0), ConstantSpeed(lift, 0.0)]
+    assert [one.profile for one in chosen.prescribed] == [ConstantSpeed(turn, 2.0), ConstantSpeed(lift, 0.0)]
 
 
 def test_a_drive_without_a_start_goes_on_from_a_state(two_assemblies):
@@ -275,9 +275,9 @@ def test_a_drive_without_a_start_is_saved_without_one_and_a_start_at_zero_with_i
     text = (tmp_path / "saved.toml").read_text(encoding="utf-8")
     assert "angle" not in re.search(r"\[prescribed.turn\](.*?)\n\[", text, re.DOTALL).group(1)
     turn, lift = model.mechanism.prescribed
-    zero = replace(model.mechanism, prescribed=(replace(turn, law=ConstantSpeed(0.0, 2.0)), lift))
+    zero = replace(model.mechanism, prescribed=(replace(turn, profile=ConstantSpeed(0.0, 2.0)), lift))
     zero.save(tmp_path / "zero.toml")
-    assert pf.load(tmp_path / "zero.toml").mechanism.prescribed[0].law == ConstantSpeed(0.0, 2.0)
+    assert pf.load(tmp_path / "zero.toml").mechanism.prescribed[0].profile == ConstantSpeed(0.0, 2.0)
 
 
 # --- Change points and dead centres -------------------------------------------------------------------------------
@@ -287,9 +287,9 @@ CHANGE_POINT = (4.0, 1.0, 3.0, 2.0)
 RATES = ((1.0 + np.sqrt(6.0)) / 5.0, (1.0 - np.sqrt(6.0)) / 5.0)
 
 
-def folded(law):
+def folded(profile):
     flat = Assembly("flat", {"crank": np.pi, "coupler": 0.0, "rocker": np.pi})
-    return four_bar(CHANGE_POINT, np.pi - 0.1, 1.0, law, assemblies=(flat,))
+    return four_bar(CHANGE_POINT, np.pi - 0.1, 1.0, profile, assemblies=(flat,))
 
 
 @pytest.mark.parametrize("speed", [1.0, -3.0])
@@ -316,9 +316,9 @@ def test_a_rate_given_at_a_change_point_chooses_the_branch(rate):
 @pytest.mark.parametrize("crank", [0.5, -0.5, 3.0])
 def test_a_drive_that_starts_at_a_change_point_away_from_the_assembly(crank):
     """A parallelogram, led flat: its rocker goes on with the crank's rate, or three times against it."""
-    lengths, law = (0.4, 0.2, 0.4, 0.2), ConstantSpeed(0.0, 3.0)
+    lengths, profile = (0.4, 0.2, 0.4, 0.2), ConstantSpeed(0.0, 3.0)
     assembled = Assembly("open", {"crank": crank, "coupler": 0.0, "rocker": crank})
-    mechanism = four_bar(lengths, 1.0, 1.0, law, assemblies=(assembled,))
+    mechanism = four_bar(lengths, 1.0, 1.0, profile, assemblies=(assembled,))
     with pytest.raises(InconsistentConstraintsError, match="a change point, at which two branches meet") as caught:
         consistent_state(build_system(mechanism), None)
     rates = [float(each) for each in re.search(r"rocker at (\S+) or (\S+) rad/s", str(caught.value)).groups()]
@@ -352,10 +352,10 @@ def test_a_drive_that_leaves_a_dead_centre_from_rest_has_two_rates():
     assert re.search(r"crank at (\S+) or", str(caught.value)).group(1).lstrip("-") == f"{rate:.6g}"
 
 
-@pytest.mark.parametrize("law", [(1.1, 0.1), (1.1, -0.1), (1.1, 0.0, 0.1)])
-def test_a_drive_that_a_dead_centre_bars_is_named(law):
+@pytest.mark.parametrize("profile", [(1.1, 0.1), (1.1, -0.1), (1.1, 0.0, 0.1)])
+def test_a_drive_that_a_dead_centre_bars_is_named(profile):
     with pytest.raises(InconsistentConstraintsError, match=r"a dead centre, the limit of reach, with push at 1\.1 m"):
-        consistent_state(build_system(slider_crank(polynomial(*law), 0.0)), None)
+        consistent_state(build_system(slider_crank(polynomial(*profile), 0.0)), None)
 
 
 def test_a_slider_held_at_its_dead_centre_runs():
@@ -401,7 +401,7 @@ def test_a_start_at_a_change_point_is_on_one_of_the_branches():
     assert run.solution.singular_positions == (0.0,)
     assert np.all(np.isnan(run.solution.multipliers[0]))
     assert np.all(np.isfinite(run.solution.multipliers[1:]))
-    assert not run.doubts
+    assert not run.findings
     model = pf.Model(mechanism, start=Start(angular={"rocker": 0.689898}))
     assert not [one for one in pf.check(model).findings if one.code == "assembly-open"]
 
@@ -410,7 +410,7 @@ def test_a_start_from_rest_at_a_change_point_is_a_singular_position_too():
     run = pf.simulate_motion(replace(folded(None), gravity=(0.0, -9.81)), 0.2, samples=11, warning=False)
     assert run.solution.singular_positions == (0.0,)
     assert np.isnan(run.solution.multipliers).any(axis=1).tolist() == [True, *[False] * 10]
-    assert not run.doubts
+    assert not run.findings
 
 
 @pytest.mark.parametrize("swapped", [False, True])
@@ -449,7 +449,7 @@ def test_forces_after_a_start_at_a_dead_centre_are_those_of_its_branch(side, met
 
     crank = RigidBody("crank", 1.0, 0.02, (0.1, 0.0), {"O": (0.0, 0.0), "A": (r, 0.0)})
     slider = RigidBody("slider", mass, 1e-3, (0.0, 0.0), {"P": (0.0, 0.0)})
-    law = pf.SampledAngle(
+    profile = pf.SampledAngle(
         lambda t: 0.7 - 0.1 * (1.0 - np.cos(10.0 * t)), lambda t: -np.sin(10.0 * t), lambda t: -10.0 * np.cos(10.0 * t)
     )
     mechanism = pf.Mechanism(
@@ -460,7 +460,7 @@ def test_forces_after_a_start_at_a_dead_centre_are_those_of_its_branch(side, met
             pf.PrismaticJoint("rail", PointRef("ground", "O"), PointRef("slider", "P")),
         ),
         assemblies=(Assembly("a", {"crank": 0.0, "slider": 0.0}, {PointRef("slider", "P"): (0.7, 0.0)}),),
-        prescribed=(PrescribedAngle("push", "rail", law),),
+        prescribed=(PrescribedAngle("push", "rail", profile),),
     )  # fmt: skip
     start = Start(angular={"crank": side * np.sqrt(10.0 / (r + r * r / length))})
     run = pf.simulate_motion(mechanism, 0.05, samples=51, start=start, options=IntegrationOptions(method=method))
@@ -469,7 +469,7 @@ def test_forces_after_a_start_at_a_dead_centre_are_those_of_its_branch(side, met
     found = pf.motion_dataset(run)["drive_torque"].values.ravel()
     assert np.isnan(found[0])
     np.testing.assert_allclose(found[2:], exact, rtol=0, atol=part * 3.97)
-    assert not run.doubts
+    assert not run.findings
 
 
 FLAT = """
@@ -501,22 +501,22 @@ B = ["coupler.B", "rocker.B"]
 D = ["ground.D", "rocker.D"]
 [prescribed.drive]
 joint = "O"
-angle = "LAW"
+angle = "PROFILE"
 [assembly.a]
 """
 PARALLEL = "crank = 0.5\ncoupler = 0.0\nrocker = 0.5\n"
 CROSSED = "crank = 0.5\ncoupler = -0.35\nrocker = -0.85\n"
 
 
-def parallelogram(tmp_path, law, assembly):
-    (tmp_path / "flat.toml").write_text(FLAT.replace("LAW", law) + assembly)
+def parallelogram(tmp_path, profile, assembly):
+    (tmp_path / "flat.toml").write_text(FLAT.replace("PROFILE", profile) + assembly)
     return pf.load(tmp_path / "flat.toml")
 
 
-@pytest.mark.parametrize("law", ["0.5 - 0.5 * cos(4 * t)", "2.5 * t**2"])
-def test_a_drive_that_leaves_a_change_point_from_rest_is_refused(tmp_path, law):
+@pytest.mark.parametrize("profile", ["0.5 - 0.5 * cos(4 * t)", "2.5 * t**2"])
+def test_a_drive_that_leaves_a_change_point_from_rest_is_refused(tmp_path, profile):
     """Two branches lead on, and no velocity chooses one: forces were those of neither (3.6 N where 61 kN are right)."""
-    model = parallelogram(tmp_path, law, "crank = 0.0\ncoupler = 0.0\nrocker = 0.0\n")
+    model = parallelogram(tmp_path, profile, "crank = 0.0\ncoupler = 0.0\nrocker = 0.0\n")
     with pytest.raises(InconsistentConstraintsError, match="at rest at a change point, from which two branches lead"):
         pf.simulate_motion(model, 0.1)
     held = parallelogram(tmp_path, "0.0", "crank = 0.0\ncoupler = 0.0\nrocker = 0.0\n")

@@ -12,7 +12,7 @@ import paraflex as pf
 import twins
 from conftest import SQUARE
 from paraflex.errors import AssemblyError, InputError, UnreachablePathError
-from paraflex.kinematics import Circle, Line, Polygon, TrapezoidalLaw, follow_path, pose_at
+from paraflex.kinematics import Circle, Line, Polygon, TrapezoidalProfile, follow_path, pose_at
 from paraflex.mechanism import (
     Assembly,
     EndEffector,
@@ -304,7 +304,7 @@ def test_a_path_out_of_reach_says_when_and_where_and_keeps_what_was_reached(rapa
     far = np.max([np.linalg.norm(start + s[:, None] * direction - base, axis=1) for base in twins.BASES], axis=0)
     first = int(np.argmax(far > REACH))
     reach = s[first - 1] + (REACH - far[first - 1]) / (far[first] - far[first - 1]) * (s[1] - s[0])
-    law = TrapezoidalLaw(float(np.linalg.norm(direction)), 5.0)
+    law = TrapezoidalProfile(float(np.linalg.norm(direction)), 5.0)
     limit = scipy.optimize.brentq(lambda t: law.evaluate(np.array([t]))[0][0] / law.length - reach, 0, law.duration)
     moment, partial = caught.value.moment, caught.value.partial
     # The walk notices at its first point beyond, and takes a millisecond at most between two; linear interpolation of

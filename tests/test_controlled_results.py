@@ -67,9 +67,9 @@ def test_what_controllers_did_is_kept(runs, data):
         one, other = run.controllers
         own = pd_data.data.isel(mode=r).sel(output=list(one.outputs), input=list(one.inputs))
         assert np.array_equal(own["reading"], one.readings)
-        assert np.array_equal(own["wanted_torque"], one.wanted)
-        assert np.array_equal(own["given_torque"], one.given)
-        assert np.array_equal(brake_data.data["given_torque"][r], other.given)
+        assert np.array_equal(own["wanted_torque"], one.requested)
+        assert np.array_equal(own["given_torque"], one.applied)
+        assert np.array_equal(brake_data.data["given_torque"][r], other.applied)
     assert np.array_equal(pd_data.data["sample"], runs[0].controllers[0].t)
     assert (pd_data.period, pd_data.delay, pd_data.law) == (1e-3, 0.0, "PID of joints")
     assert (brake_data.period, brake_data.delay) == (2e-3, 1e-3)
@@ -142,9 +142,9 @@ def test_a_run_without_a_path(tmp_path):
     data = load_results(tmp_path / "run.nc")
     assert data["reading_pd"].dims == ("sample_pd", "input_pd")
     assert (data["reading_pd"].attrs["units"], data["reading_pd"].attrs["units_each"]) == ("rad, rad/s", "rad, rad/s")
-    assert np.array_equal(data["given_torque_pd"], run.controllers[0].given)
+    assert np.array_equal(data["given_torque_pd"], run.controllers[0].applied)
     told = motion_summary(data)["controllers"]["pd"]
-    limited = int(np.sum(np.abs(run.controllers[0].wanted) > 20.0))
+    limited = int(np.sum(np.abs(run.controllers[0].requested) > 20.0))
     assert 0 < limited < 20
     assert told["saturated_share"] == limited / 20
     assert told["torques"]["tau"] == {
@@ -166,7 +166,7 @@ def test_a_table_for_each_controller(runs, data, tmp_path):
     written = {file.name for file in export(data, tmp_path, "csv")}
     assert "controller_pd.csv" in written
     back = pd.read_csv(tmp_path / "controller_brake.csv")
-    assert np.array_equal(back["given_torque_brake_tau1 [N m]"][:40], runs[0].controllers[1].given[:, 0])
+    assert np.array_equal(back["given_torque_brake_tau1 [N m]"][:40], runs[0].controllers[1].applied[:, 0])
 
 
 def test_matlab_has_samples_first(data):
@@ -193,7 +193,9 @@ def test_internal_torques_are_those_of_the_law(task, runs, data):
 
 def test_the_share_of_saturated_samples(runs):
     pd, brake = runs[0].controllers
-    limited = np.sum(np.any(pd.wanted != pd.given, axis=1)) + np.sum(np.any(brake.wanted != brake.given, axis=1))
+    limited = np.sum(np.any(pd.requested != pd.applied, axis=1)) + np.sum(
+        np.any(brake.requested != brake.applied, axis=1)
+    )
     assert limited > 0
     assert run_metrics(runs[0])["saturated_share"] == limited / (80 + 40)
 

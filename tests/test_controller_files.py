@@ -91,8 +91,8 @@ def test_a_pid_controller_is_what_it_says():
     assert done.limits.tolist() == [[-20.0, 30.0]]
     assert done.rates.tolist() == [5e4]
     # The first sample: the angle is 1 as the filter is settled, its reference is zero, and no rate is known.
-    assert done.wanted[0] == pytest.approx([-40.0], abs=1e-12)
-    assert done.given[0].tolist() == [-20.0]
+    assert done.requested[0] == pytest.approx([-40.0], abs=1e-12)
+    assert done.applied[0].tolist() == [-20.0]
     assert done.readings[0] == pytest.approx([1.0], abs=1e-12)
 
 
@@ -101,7 +101,7 @@ def test_references_are_functions_of_time():
     held = replace(model.controllers["joint"], delay=0.0, filters={}, limits=None, rates=None, quantise=None,
                    law=pf.JointPID(40.0))  # fmt: skip
     (done,) = Simulation(model, duration=0.01, samples=11).run(held).controllers
-    assert done.wanted[:, 0] == pytest.approx(-40.0 * (done.readings[:, 0] - 0.2 * np.sin(2.0 * done.t)), abs=1e-12)
+    assert done.requested[:, 0] == pytest.approx(-40.0 * (done.readings[:, 0] - 0.2 * np.sin(2.0 * done.t)), abs=1e-12)
 
 
 @pytest.mark.parametrize("text", [STATE_SPACE, PID])
@@ -218,7 +218,7 @@ def test_what_is_given_by_motor_is_used_of_those_of_a_mode():
 def test_the_same_as_a_law_in_python():
     by_file, by_hand = Simulation(rotor(), duration=0.02, samples=21), Simulation(rotor(), duration=0.02, samples=21)
     file, hand = by_file.run(read(STATE_SPACE).controllers["pd"]), by_hand.run(pd_law())
-    assert np.allclose(file.controllers[0].given, hand.controllers[0].given, rtol=1e-12)
+    assert np.allclose(file.controllers[0].applied, hand.controllers[0].applied, rtol=1e-12)
 
 
 # --- Runs and studies -------------------------------------------------------------------------------------------------
@@ -268,7 +268,7 @@ def test_run_takes_controllers(robot, tmp_path):
     run = Simulation(task, mode="++++", feed_forward=True, options=options).run(
         [model.controllers["pd"], model.controllers["brake"]]
     )
-    assert np.array_equal(data["given_torque_pd"][0], run.controllers[0].given)
+    assert np.array_equal(data["given_torque_pd"][0], run.controllers[0].applied)
     assert np.array_equal(data["torque"][0], run.applied)
     assert set(told(tmp_path / "out")["controllers"]) == {"pd", "brake"}
     # The figures that a run writes; they are drawn below.
@@ -290,7 +290,7 @@ def test_the_study_names_controllers_and_none_is_none_of_them(robot, tmp_path):
     # Linearised along a run it is made again, under its controllers.
     _, runs = repeated_runs(str(tmp_path / "study"))
     (run,) = runs
-    assert np.array_equal(run.controllers[0].given, pf.open_results(tmp_path / "study")["given_torque_pd"][0])
+    assert np.array_equal(run.controllers[0].applied, pf.open_results(tmp_path / "study")["given_torque_pd"][0])
 
 
 @pytest.mark.parametrize(

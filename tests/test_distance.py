@@ -234,7 +234,7 @@ def test_point_masses_on_rods_swing_as_lagrange_has_it():
     np.testing.assert_allclose(force, tensions[:, 1:] * along, rtol=0, atol=1e-5 * scale)
     assert np.max(np.abs(data["joint_moment"].values)) == 0.0
     assert solution.energy_balance_max < 1e-7
-    assert run.doubts == ()
+    assert run.findings == ()
 
 
 def held_bar(**more):

@@ -328,7 +328,7 @@ def test_loads_have_their_sizes_and_say_from_when_they_act(rider: Path) -> None:
 
 
 def test_a_load_that_begins_between_the_times_looked_at_is_told_exactly() -> None:
-    step = pf.PiecewiseLaw((pf.ConstantSpeed(0.0, 0.0), pf.ConstantSpeed(0.0, 3.0)), (0.0123,))
+    step = pf.PiecewiseProfile((pf.ConstantSpeed(0.0, 0.0), pf.ConstantSpeed(0.0, 3.0)), (0.0123,))
     late = acting_load(pf.PointForce("f", pf.PointRef("a", "b"), (step, 0.0)), 1.0)
     assert late.begins == pytest.approx(0.0123, abs=1e-12)
 

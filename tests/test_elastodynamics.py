@@ -229,13 +229,13 @@ def deviation_from_the_full_model(mechanism, mode):
     active = [motor for motor in mechanism.motors if motor.name in task.mode(mode).motors]
     t = np.linspace(0.0, 0.08, 801)
     motion = task.plan.follow(t)
-    laws = []
+    profiles = []
     for motor in active:
         phi = motion.q[:, motion.system.body(mechanism.joint(motor.joint).b.body).angle]
         spline = scipy.interpolate.make_interp_spline(t, phi, k=5)
-        law = SampledAngle(spline, spline.derivative(1), spline.derivative(2), SHORT.knots[1:])
-        laws.append(PrescribedAngle(f"{motor.name} law", motor.joint, law))
-    driven = build_system(replace(mechanism, prescribed=tuple(laws)))
+        profile = SampledAngle(spline, spline.derivative(1), spline.derivative(2), SHORT.knots[1:])
+        profiles.append(PrescribedAngle(f"{motor.name} profile", motor.joint, profile))
+    driven = build_system(replace(mechanism, prescribed=tuple(profiles)))
     signals, knots = pack_signals(driven.mechanism, constant_signals([0.0] * 4, 0.08), 0.08)
     full = integrate(
         driven, signals, task.start, task.motion.t, knots=np.array(knots), options=IntegrationOptions(tolerance=1e-6)

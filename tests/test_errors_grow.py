@@ -34,7 +34,7 @@ def simulate(mechanism, duration, **options):
 
 
 def found(run):
-    return [one.text for one in run.doubts if one.code == "errors-grow"]
+    return [one.text for one in run.findings if one.code == "errors-grow"]
 
 
 @pytest.mark.parametrize(

@@ -6,7 +6,7 @@ import pytest
 import twins
 from paraflex.arguments import with_fields
 from paraflex.designs.derivatives.changes import Change
-from paraflex.designs.derivatives.plans import given, nominal_values, size_of
+from paraflex.designs.derivatives.plans import nominal_values, run_inputs, size_of
 from paraflex.designs.derivatives.stencil import STENCILS
 from paraflex.designs.derivatives.steps import COMPLEX_STEP, complex_step, part
 from paraflex.designs.run import Task, plan_task
@@ -189,7 +189,7 @@ def test_what_a_run_is_given(study, name):
     setting, k = study.setting, NAMES.index(name)
     task = Task(0, 0, nominal_values(setting), "line")
     planned, options = plan_task(setting, task)
-    nominal = given(planned, options, "++++")
+    nominal = run_inputs(planned, options, "++++")
     size = size_of(setting, task, k)
     found = Change(setting, task, planned, k, size).of_mode(nominal)
     systems, torques, times = [], [], nominal.torques.times

@@ -52,12 +52,12 @@ OWN_FIELD = """
 from dataclasses import dataclass, field
 
 from paraflex.mechanism import Joint
-from paraflex.mechanism.quantities import positive, said
+from paraflex.mechanism.quantities import field_metadata, positive
 
 
 @dataclass(frozen=True)
 class BushJoint(Joint, kind="bush", holds=("points",)):
-    width: float = field(metadata=said("the width in mm", positive, "mm"))
+    width: float = field(metadata=field_metadata("the width in mm", positive, "mm"))
 
 
 import paraflex as pf

@@ -182,6 +182,6 @@ disc = 0.0
         encoding="utf-8",
     )
     mechanism = load(file).mechanism
-    angle, rate, _ = mechanism.prescribed[0].law.evaluate(__import__("numpy").array([2.0]))
+    angle, rate, _ = mechanism.prescribed[0].profile.evaluate(__import__("numpy").array([2.0]))
     assert (angle[0], rate[0]) == (6.0, 3.0)
     assert mechanism.body("disc").points["P"] == (0.5, 0.0)

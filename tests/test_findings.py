@@ -16,7 +16,7 @@ from paraflex.findings import CODES, Finding, Level, Verdict
 from paraflex.mechanism import FlexibleBeam, Material, Section
 from paraflex.motion import simulate_motion
 from paraflex.results import motion_dataset, motion_summary
-from paraflex.results.doubts import verdict_of
+from paraflex.results.findings import verdict_of
 from shell import paraflex
 
 MODELS = Path(__file__).parent / "data" / "slips"
@@ -180,13 +180,13 @@ def test_forces_beyond_mass_and_loads_are_doubted_with_what_may_be_to_blame(tmp_
     with pytest.warns(pf.ResultWarning, match=r"lift takes .* N .* look at damper\.oil"):
         run = simulate_motion(model.mechanism, 1.0, samples=51)
     # So stiff a damper that rounding decides whether energy balances as well.
-    (finding,) = (one for one in run.doubts if one.code != "energy-unbalanced")
+    (finding,) = (one for one in run.findings if one.code != "energy-unbalanced")
     assert finding.code == "force-large"
     # The oil's force is its coefficient times the speed, 0.1 m/s at most.
     force = float(re.search(r"takes (\S+) N", finding.text)[1])
     assert 1e7 < force < 2e8 * 0.1
     assert motion_summary(motion_dataset(run))["verdict"]["findings"][-1]["code"] == "force-large"
-    assert simulate_motion(pf.load(MODELS / "lift.toml").mechanism, 1.0, samples=51).doubts == ()
+    assert simulate_motion(pf.load(MODELS / "lift.toml").mechanism, 1.0, samples=51).findings == ()
 
 
 def test_links_that_bend_like_springs_and_paths_that_are_not_followed_are_doubted(tmp_path):
@@ -199,13 +199,13 @@ def test_links_that_bend_like_springs_and_paths_that_are_not_followed_are_doubte
     with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         run = task.simulate("both", options=options)
-    codes = {one.code for one in run.doubts}
+    codes = {one.code for one in run.findings}
     assert codes == {one.message.finding.code for one in caught if one.category is pf.ResultWarning}
     desired = task.motion.desired.position
     extent = np.linalg.norm(np.ptp(desired, axis=0))
     assert ("error-large" in codes) == (run.driven.deviation > 0.5 * extent)
     assert codes
-    for one in run.doubts:
+    for one in run.findings:
         assert one.place == "mode both"
         assert one.remedy.startswith("most likely because of body.rod1.material")
 
@@ -216,7 +216,7 @@ def test_efforts_far_beyond_inertia_are_doubted(tmp_path):
     model = pf.load(slipped(tmp_path, "gantry", "[end_effector]", spring))
     task = pf.plan(model.mechanism.rigid(), model.path("line"), samples=21)
     run = task.simulate("both", options=pf.IntegrationOptions(tolerance=1e-3), warning=False)
-    found = [one for one in run.doubts if one.code == "torque-large"]
+    found = [one for one in run.findings if one.code == "torque-large"]
     assert found
     assert found[0].remedy == "look at spring.s, and their units"
 

@@ -8,12 +8,12 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import paraflex as pf
-from paraflex.designs.derivatives.plans import given_torques
-from paraflex.dynamics import constant_signals, law_signal, pack_signals
+from paraflex.designs.derivatives.plans import inputs_with_torques
+from paraflex.dynamics import constant_signals, pack_signals, profile_signal
 from paraflex.dynamics.inputs import inputs_of
 from paraflex.dynamics.joint_loads import drive_torques, joint_loads
 from paraflex.errors import IntegrationError
-from paraflex.files.laws import ExpressionLaw
+from paraflex.files.profiles import ExpressionProfile
 from paraflex.integrators.forms import OdeForm
 from paraflex.integrators.limits import step_limits
 from paraflex.results.loads import load_figures
@@ -75,7 +75,7 @@ def test_a_turned_arm_needs_the_torque_of_its_weight(model, method):
     exact = 2.0 * np.hypot(-40.0 * np.cos(10.0 * t), 9.81 - 40.0 * np.sin(10.0 * t))
     np.testing.assert_allclose(force, exact, rtol=0.0, atol=1e-2)
     assert solution.energy_balance_max < 1e-3 * 125.0
-    assert not [one.code for one in run.doubts]
+    assert not [one.code for one in run.findings]
 
 
 @pytest.mark.parametrize("method", OWN)
@@ -101,7 +101,7 @@ def test_a_pulse_within_a_long_step_is_met(model):
     run = motion(model(pulse))
     whole = pf.simulate_motion(model(pulse), samples=2501, warning=False)
     assert np.max(np.abs(drive_torques(whole.system, whole.solution.multipliers))) == pytest.approx(8.0, rel=1e-2)
-    (found,) = [one for one in run.doubts if one.code == "samples-coarse"]
+    (found,) = [one for one in run.findings if one.code == "samples-coarse"]
     assert "prescribed.drive" in found.text
 
 
@@ -117,8 +117,8 @@ def test_limits_of_steps_follow_what_is_given_in_time(model):
 
 def test_laws_are_followed_however_often_they_change_in_a_run():
     """A thousand seconds of 50 rad/s: pieces of half a second each would hold four vibrations."""
-    law, end = ExpressionLaw("sin(50*t)"), 1000.0
-    signal, _ = law_signal("load.F", law, end)
+    law, end = ExpressionProfile("sin(50*t)"), 1000.0
+    signal, _ = profile_signal("load.F", law, end)
     t = np.random.default_rng(0).uniform(0.0, end, 1000)
     piece = np.searchsorted(signal.breaks, t, side="right") - 1
     powers = (t - signal.breaks[piece])[:, None] ** np.arange(6)
@@ -126,7 +126,7 @@ def test_laws_are_followed_however_often_they_change_in_a_run():
         np.sum(powers * signal.coefficients[piece], axis=1), np.sin(50.0 * t), rtol=0.0, atol=1e-8
     )
     with pytest.raises(pf.InputError, match="changes too fast"):
-        law_signal("load.F", ExpressionLaw("sin(1e6*t)"), end)
+        profile_signal("load.F", ExpressionProfile("sin(1e6*t)"), end)
 
 
 @pytest.mark.parametrize("name", ["five_bar", "four_bar", "geared_five_bar", "slider_crank_flexible"])
@@ -331,7 +331,7 @@ def test_forces_of_damped_beams_are_right_by_default(damping):
     bodies = tuple(
         replace(body, damping=damping) if isinstance(body, pf.FlexibleBeam) else body for body in model.mechanism.bodies
     )
-    load = pf.PointForce("F", "coupler.B", (ExpressionLaw("5*sin(1200*t)"), ExpressionLaw("3*cos(700*t)")))
+    load = pf.PointForce("F", "coupler.B", (ExpressionProfile("5*sin(1200*t)"), ExpressionProfile("3*cos(700*t)")))
     mechanism = replace(model.mechanism, bodies=bodies, loads=(load,))
 
     def forces(**options):
@@ -356,7 +356,7 @@ def test_forces_of_damped_beams_that_steps_do_not_resolve_are_a_finding(damping,
         run = pf.simulate_motion(
             mechanism, 0.3, samples=301, warning=False, options=pf.IntegrationOptions(control=control)
         )
-        says = [one.remedy for one in run.doubts if one.code == "forces-unresolved"]
+        says = [one.remedy for one in run.findings if one.code == "forces-unresolved"]
         assert bool(says) is (found and control == "positions")
         assert not says or 'control = "forces"' in says[0]
 
@@ -412,7 +412,7 @@ def test_deflections_follow_a_slow_load(method):
     mechanism = pf.Mechanism(
         name="arm", ground={"O": (0.0, 0.0)}, bodies=(beam,), assemblies=(pf.Assembly("a", {"arm": 0.0}),),
         joints=(pf.WeldJoint("O", pf.PointRef("ground", "O"), pf.PointRef("arm", "O")),),
-        loads=(pf.PointForce("p", "arm.tip", (ExpressionLaw("0"), ExpressionLaw("500*sin(2*pi*t)"))),),
+        loads=(pf.PointForce("p", "arm.tip", (ExpressionProfile("0"), ExpressionProfile("500*sin(2*pi*t)"))),),
         gravity=(0.0, 0.0),
     )  # fmt: skip
     run = pf.simulate_motion(mechanism, 1.5, samples=301, warning=False, options=pf.IntegrationOptions(method=method))
@@ -427,7 +427,7 @@ def test_deflections_follow_a_slow_load(method):
     work = force**2 * L**3 / (6.0 * EI)
     assert np.max(np.abs(run.solution.work - work)) < 0.01 * np.max(work)
     # Work of forces on deflections hardly above the tolerance is uncertain, which the tolerance explains.
-    assert all(one.code != "energy-unbalanced" for one in run.doubts)
+    assert all(one.code != "energy-unbalanced" for one in run.findings)
 
 
 @pytest.mark.parametrize("frames", [1, 4])
@@ -461,7 +461,7 @@ def test_samples_within_short_steps_solve_the_equations_of_motion(tracking, chos
     """Curves between stages are up to 10 % of the largest force away from that with steps of 1 ms of esdirk5."""
     options = pf.IntegrationOptions(**chosen)
     run = pf.simulate(tracking, "++++", warning=False, options=options)
-    form = OdeForm(given_torques(tracking, options, run.torques).problem, options)
+    form = OdeForm(inputs_with_torques(tracking, options, run.torques).problem, options)
     found = [form.solve(*state) for state in zip(run.solution.t, run.solution.q, run.solution.v, strict=True)]
     for exact, of_run in (
         (np.array([one.multipliers for one in found]), run.solution.multipliers),
@@ -637,7 +637,7 @@ samples = 101
 def test_loads_faster_than_what_elements_resolve_are_a_finding(model, elements, fast, found):
     """At 30 times its lowest frequency a cantilever of one element has half of the force in its clamp."""
     given = model(CANTILEVER.replace("ELEMENTS", str(elements)).replace("FAST", str(fast)))
-    assert [one.code for one in motion(given).doubts].count("elements-few") == found
+    assert [one.code for one in motion(given).findings].count("elements-few") == found
 
 
 def slowly_begun(w, ramp=15.0):

@@ -26,7 +26,8 @@ from paraflex.designs.reopen import open_study
 from paraflex.errors import InputError, OutputError
 from paraflex.files import library_text
 from paraflex.folders import RUN, finish_change, hold_folder, read_manifest
-from paraflex.plots.labels import axis_label, plain
+from paraflex.formatting import labelled
+from paraflex.plots.labels import plain
 from paraflex.plots.sources import open_source
 from paraflex.plots.svg import sketch
 from paraflex.report.text import NO_VALUE, number
@@ -314,7 +315,7 @@ def test_control_characters_in_names_and_endless_names_leave_pictures_whole(tmp_
     ElementTree.parse(tmp_path / "own.svg")
     ElementTree.fromstring(sketch(pf.load(tmp_path / "own.toml").mechanism))
     assert len(plain("x" * 10**6)) < 1000
-    assert len(axis_label("time", unit="s" * 10**6)) < 1000
+    assert len(labelled("time", "s" * 10**6)) < 1000
 
 
 class Counted(dict):

@@ -193,7 +193,7 @@ def test_a_geared_chain_swings_as_lagrange_has_it():
     run = simulate_motion(chain(), 1.5, options=EXACT, samples=31)
     np.testing.assert_allclose(run.solution.q[:, 2], chain_motion(times), rtol=0, atol=1e-6)
     assert run.solution.energy_balance_max < 1e-7
-    assert run.doubts == ()
+    assert run.findings == ()
 
 
 @pytest.mark.parametrize("method", METHODS)

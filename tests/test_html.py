@@ -35,7 +35,7 @@ from paraflex.studies import (
     verify,
 )
 from paraflex.studies.html import indices_html, search_html
-from paraflex.studies.optimisation.identify import IdentificationResult, Reached
+from paraflex.studies.optimisation.identify import IdentificationResult, TargetResult
 from paraflex.studies.optimisation.indices import IndicesResult
 from paraflex.studies.optimisation.objective import Target
 
@@ -252,7 +252,7 @@ def test_an_identification_and_indices(tmp_path: Path) -> None:
     target = Target(run=0, path="square", mode="++", column="tracking_rms", value=2.0, weight=1.0)  # pyright: ignore[reportCallIssue]
     found = IdentificationResult(
         name="rod", folder=tmp_path, values={"x": 1.5}, start={"x": 1.0}, residual=0.05, start_residual=0.5,
-        targets=(Reached(target, 2.1, 1.0, 0.05),), confidence=None, bounds={}, evaluations=7, fresh=0, failed=0,
+        targets=(TargetResult(target, 2.1, 1.0, 0.05),), confidence=None, bounds={}, evaluations=7, fresh=0, failed=0,
         reasons=(), derivatives="exact", stopped="converged", interrupted=False, seconds=1.0,
     )  # fmt: skip
     shown = read(search_html(found))

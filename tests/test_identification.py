@@ -94,7 +94,7 @@ def test_deviations_are_those_of_a_linear_model(tmp_path):
     correlation = covariance[0, 1] / np.sqrt(covariance[0, 0] * covariance[1, 1])
     assert found.correlation == pytest.approx(np.array([[1.0, correlation], [correlation, 1.0]]), rel=1e-5)
     assert found.condition == pytest.approx(np.linalg.cond(jacobian), rel=1e-5)
-    assert found.telling
+    assert found.identifiable
 
 
 def test_weights_and_relative_residuals(tmp_path):
@@ -121,7 +121,7 @@ def test_parameters_that_the_data_cannot_tell_apart(tmp_path):
     assert result.residual < 1e-6
     found = result.confidence
     assert found is not None
-    assert not found.telling
+    assert not found.identifiable
     along = np.array(list(found.weakest.values()))
     assert abs(along @ [1.0, -2.0]) / np.sqrt(5.0) == pytest.approx(1.0, abs=1e-4)
     told = json.loads((tmp_path / "out" / "result.json").read_text())["confidence"]
@@ -156,9 +156,9 @@ def test_all_parameters_at_bounds(tmp_path):
     folder = tmp_path / "out"
     result = identify(study, folder, run=made_up(**METRICS))
     assert result.confidence is not None
-    from paraflex.studies.optimisation.evaluate import Evaluated
+    from paraflex.studies.optimisation.evaluate import EvaluatedDesign
 
-    design = Evaluated(0, tuple(result.values.values()), (), ())
+    design = EvaluatedDesign(0, tuple(result.values.values()), (), ())
     slopes = {name: np.ones((1, 2)) for name in METRICS}
     found = confidence(study, study.targets, design, residual_slopes(study.targets, slopes), {"x": "low", "y": "low"})
     assert found.free == ()

@@ -13,9 +13,9 @@ from paraflex.kernel.packed import make_scratch
 
 SEEDS = (31, 32)
 TIME = 0.37
-# Signals replace a prescribed law by quintic pieces, some 2000 a second: with sixth derivatives of 1e3 their values
+# Signals replace a prescribed profile by quintic pieces, some 2000 a second: with sixth derivatives of 1e3 their values
 # are right to rounding, their second derivatives to 1e-16/(1e-3)^2, less than 1e-8.
-LAW = 1e-8
+PROFILE = 1e-8
 
 
 def rows_and_forces(system, t, q, v, a, lam, weight_v, weight_q):
@@ -32,7 +32,7 @@ def law_of_rows(system, t):
     out = np.zeros((3, system.m))
     for prescribed in system.mechanism.prescribed:
         row = system.rows.index(f"{prescribed.name} angle")
-        out[:, row] = [x[0] for x in prescribed.law.evaluate(np.array([t]))]
+        out[:, row] = [x[0] for x in prescribed.profile.evaluate(np.array([t]))]
     return out
 
 
@@ -48,9 +48,9 @@ def test_constraints_and_their_rate(system, seed):
     q, v, _ = twins.random_state(system, seed)
     phi, rate = system.constraints(twins.still_signals(system), TIME, q, v)
     np.testing.assert_allclose(phi, twins.constraints(system, TIME, q), rtol=0, atol=1e-12)
-    # Phi' = Phi_q q' - law', the first by the complex step.
+    # Phi' = Phi_q q' - profile', the first by the complex step.
     expected = twins.along(lambda q: twins.constraints(system, TIME, q), q, v) - law_of_rows(system, TIME)[1]
-    np.testing.assert_allclose(rate, expected, rtol=0, atol=LAW * 1e-2)
+    np.testing.assert_allclose(rate, expected, rtol=0, atol=PROFILE * 1e-2)
 
 
 @pytest.mark.parametrize("seed", SEEDS)
@@ -91,7 +91,7 @@ def test_acceleration_rows_are_second_derivatives_along_a_motion(system, seed, w
     expected = twins.along(velocity_of_phi, 0.0, 1.0) - acceleration
     expected += weight_v * (velocity_of_phi(0.0) - rate) + weight_q * twins.constraints(system, TIME, q0)
     scale = np.max(np.abs(expected))
-    np.testing.assert_allclose(rows, expected, rtol=0, atol=1e-12 * scale + LAW)
+    np.testing.assert_allclose(rows, expected, rtol=0, atol=1e-12 * scale + PROFILE)
 
 
 # --- Prescribed angles ---------------------------------------------------------------------------------------------
@@ -115,17 +115,17 @@ def test_a_prescribed_angle_is_the_angle_of_body_b_less_that_of_body_a(linkage, 
 
 
 @pytest.mark.parametrize("time", [0.0, 0.1234, 0.5, 1.0])
-def test_a_prescribed_law_reaches_the_rows_with_both_derivatives(time):
-    # At rest in the origin all that is left of the rows is the law.
+def test_a_prescribed_profile_reaches_the_rows_with_both_derivatives(time):
+    # At rest in the origin all that is left of the rows is the profile.
     system = build_system(make_linkage())
     zero = np.zeros(system.n)
     row = system.rows.index("wave angle")
     expected = [0.3 + np.sin(3 * time), 3 * np.cos(3 * time), -9 * np.sin(3 * time)]
     lam = np.zeros(system.m)
     found = -rows_and_forces(system, time, zero, zero, zero, lam, 0.0, 0.0)[0][row]
-    assert found == pytest.approx(expected[2], abs=LAW)
+    assert found == pytest.approx(expected[2], abs=PROFILE)
     found = -rows_and_forces(system, time, zero, zero, zero, lam, 5.0, 7.0)[0][row]
-    assert found == pytest.approx(expected[2] + 5.0 * expected[1] + 7.0 * expected[0], abs=LAW)
+    assert found == pytest.approx(expected[2] + 5.0 * expected[1] + 7.0 * expected[0], abs=PROFILE)
 
 
 # --- Motors --------------------------------------------------------------------------------------------------------

@@ -12,7 +12,7 @@ def test_every_kind_with_data_has_figures_and_a_report_or_says_why_not():
     drawn = {name for name, kind in RESULT_KINDS.items() if kind.data or kind.marks or name == "sweep"}
     assert set(CATALOGUE) == drawn
     for kind in RESULT_KINDS.values():
-        if kind.made_by:
+        if kind.producers:
             assert bool(kind.page) != ("page" in kind.refusals), kind.name
             assert kind.data in kind.files
         if kind.page:

@@ -19,7 +19,7 @@ from paraflex.control import ControllerDescription, simulate_controlled
 from paraflex.control.laws.joints import internal_torques
 from paraflex.errors import InputError
 from paraflex.plots.style import BLUE, VERMILLION
-from paraflex.reduction import reduced_mechanism
+from paraflex.reduced_bodies import reduced_mechanism
 from paraflex.studies import LawStudy
 from paraflex.studies.laws import laws_of
 from shell import interrupted, paraflex

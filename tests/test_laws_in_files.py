@@ -173,7 +173,7 @@ def test_what_the_page_shows_is_read_and_runs(tmp_path):
         made = one.made(model.mechanism, MOTORS)
         planned = not one.law.whole_torque
         run = Simulation(task, mode="++++", feed_forward=planned).run(made, until=0.002, warning=False)
-        assert np.all(np.isfinite(run.controllers[0].given)), one.name
+        assert np.all(np.isfinite(run.controllers[0].applied)), one.name
 
 
 # --- Computed torque --------------------------------------------------------------------------------------------------
@@ -184,7 +184,7 @@ def test_computed_torque_drives_alone(model, task):
     run = simulate_controlled(task, "++++", [model.controllers["ct"]])
     law = SampledController(pf.ComputedTorque(15.0, cutoff=300.0), period=1e-3)
     by_hand = Simulation(task, mode="++++").run(law, warning=False)
-    assert np.array_equal(run.controllers[0].given, by_hand.controllers[0].given)
+    assert np.array_equal(run.controllers[0].applied, by_hand.controllers[0].applied)
     assert not np.any(run.torques.evaluate(task.motion.t))
     planned = task.torques("++++").evaluate(task.motion.t)
     assert np.max(np.abs(run.applied)) == pytest.approx(np.max(np.abs(planned)), rel=0.05)
@@ -284,8 +284,8 @@ def test_a_rotor_under_lqg_is_that_of_its_equations():
     law, torques = design.law(), []
     for y in done.readings - 0.2:
         torques.append(law.step(0, 0.0, y))
-    assert done.wanted == pytest.approx(np.array(torques), abs=1e-9)
-    assert np.max(np.abs(done.wanted)) > 1.0
+    assert done.requested == pytest.approx(np.array(torques), abs=1e-9)
+    assert np.max(np.abs(done.requested)) > 1.0
     assert sim.sensors()["hub"] == pytest.approx(0.2, abs=1e-6)
     assert done.law == "LQG of 2 states"
 
@@ -406,9 +406,9 @@ def test_a_run_with_a_design_goes_on_from_what_was_saved():
     saved = sim.save()
     for _ in range(2):
         sim.restore(saved)
-        ends.append(sim.run().controllers[0].wanted)
+        ends.append(sim.run().controllers[0].requested)
     assert np.array_equal(*ends)
-    assert np.array_equal(ends[0], sim.run(rotor.controllers["lq"]).controllers[0].wanted)
+    assert np.array_equal(ends[0], sim.run(rotor.controllers["lq"]).controllers[0].requested)
 
 
 @pytest.mark.parametrize("mode", ["++++", "+-+-"])
@@ -431,8 +431,8 @@ def test_lqg_is_designed_for_the_mode(model, task, mode):
     assert design.outputs == done.outputs
     law = SampledController(design.law(), quantise=resolution, reference="open-loop")
     by_hand = Simulation(task, mode=mode, feed_forward=True).run(law, warning=False)
-    assert done.given == pytest.approx(by_hand.controllers[0].given, abs=1e-12)
-    assert np.max(np.abs(done.given)) > 1e-3
+    assert done.applied == pytest.approx(by_hand.controllers[0].applied, abs=1e-12)
+    assert np.max(np.abs(done.applied)) > 1e-3
     assert done.law == "LQG of 4 states"
 
 
@@ -455,7 +455,7 @@ def test_lqg_of_few_states_and_another_time(model):
     assert np.allclose(controller.started.design.K, design.K, rtol=0.0, atol=1e-9)
     assert controller.title == "LQG of 20 states"
     assert pf.closed_loop(full, design).stable
-    assert "loop-unstable" not in [one.code for one in run.doubts]
+    assert "loop-unstable" not in [one.code for one in run.findings]
 
 
 def test_a_loop_that_is_unstable_with_all_states_is_found(model):
@@ -463,7 +463,7 @@ def test_a_loop_that_is_unstable_with_all_states_is_found(model):
     flexible = model.plan(duration=0.005, samples=6)
     stiff = replace(model.controllers["lq"], law=replace(model.controllers["lq"].law, noise=1e-4))
     run = simulate_controlled(flexible, "++++", [stiff])
-    (found,) = [one for one in run.doubts if one.code == "loop-unstable"]
+    (found,) = [one for one in run.findings if one.code == "loop-unstable"]
     assert found.place == "mode ++++"
     assert re.search(r'controller "lq": the sampled loop is unstable about the start: \|z\| = 1\.0\d+ at', found.text)
     with warnings.catch_warnings(record=True) as said:
@@ -542,7 +542,7 @@ def test_a_design_is_for_the_motors_that_it_drives(model, task):
     by_hand = Simulation(task, mode="++++", feed_forward=True).run(law, warning=False).controllers[0]
     for done in runs:
         assert done.outputs == ("tau1", "tau5")
-        assert done.given == pytest.approx(by_hand.given, abs=1e-12)
+        assert done.applied == pytest.approx(by_hand.applied, abs=1e-12)
 
 
 def test_a_design_in_python_starts_anew(task):
@@ -636,7 +636,7 @@ def test_controllers_act_beside_shaped_torques():
     run = simulate_controlled(task, "++++", [ControllerDescription("pd", pf.JointPID(5.0), 1e-3)])
     reached = run.solution.t
     assert run.torques.evaluate(reached) == pytest.approx(task.torques("++++").evaluate(reached), abs=1e-12)
-    assert np.max(np.abs(run.controllers[0].given)) < 0.01 * np.max(np.abs(run.applied))
+    assert np.max(np.abs(run.controllers[0].applied)) < 0.01 * np.max(np.abs(run.applied))
 
 
 def test_without_a_duration_shaped_torques_have_their_time():

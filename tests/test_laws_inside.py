@@ -82,7 +82,7 @@ def test_a_rotor_does_the_same(law, chain):
         more["reference"] = {"hub": 0.1}
     inside, outside = both(make, own | more)
     a, b = inside.controllers[0], outside.controllers[0]
-    for name in ("t", "readings", "wanted", "given"):
+    for name in ("t", "readings", "requested", "applied"):
         # Readings are rounded to a resolution: rounding of the last bits may move one of them by a step of it.
         np.testing.assert_allclose(getattr(a, name), getattr(b, name), rtol=1e-9, atol=1e-9, err_msg=name)
     np.testing.assert_allclose(inside.acting, outside.acting, rtol=1e-9, atol=1e-9)
@@ -118,7 +118,7 @@ def test_models_of_others_run_as_they_are(model):
         y, torques = done.readings[:, 0] - reference, [0.0]
         for k in range(y.size):
             torques.append(0.2 * torques[-1] - 80.0 * y[k] + (60.0 * y[k - 1] if k else 0.0))
-        assert done.wanted[:, 0] == pytest.approx(torques[1:], rel=1e-9, abs=1e-9)
+        assert done.requested[:, 0] == pytest.approx(torques[1:], rel=1e-9, abs=1e-9)
         assert sim._loop.inside is not None
     assert pf.closed_loop(pf.linearise(rotor()), model, inputs=["hub"]).plant.period == T
 
@@ -173,7 +173,7 @@ def test_redundant_motors_with_projection_and_gauges(task):
             runs.append(sim.run(kind(law, period=T, delay=T, limits=2e-3, **more), warning=False))
             assert (sim._loop.inside is not None) is (kind is SampledController)
         a, b = runs
-        np.testing.assert_allclose(a.controllers[0].wanted, b.controllers[0].wanted, rtol=1e-6, atol=1e-10)
+        np.testing.assert_allclose(a.controllers[0].requested, b.controllers[0].requested, rtol=1e-6, atol=1e-10)
         np.testing.assert_allclose(a.solution.q, b.solution.q, rtol=1e-9, atol=1e-12)
 
 
@@ -236,7 +236,7 @@ def test_saved_and_restored_it_has_the_same_bits(law):
     again = sim.run()
     np.testing.assert_array_equal(first.solution.q, again.solution.q)
     np.testing.assert_array_equal(first.acting, again.acting)
-    np.testing.assert_array_equal(first.controllers[0].wanted, again.controllers[0].wanted)
+    np.testing.assert_array_equal(first.controllers[0].requested, again.controllers[0].requested)
     assert len(first.controllers[0].t) == 50
     # One that went another way in between comes back as well.
     sim.reset()
@@ -401,7 +401,7 @@ def test_what_a_compiled_function_is_given():
     inside, outside = both(lambda: CompiledLaw(adds), BOTH)
     plain, _ = both(lambda: CompiledLaw(pd), BOTH)
     for run in (inside, outside):
-        np.testing.assert_allclose(run.controllers[0].wanted, plain.controllers[0].wanted, rtol=1e-9, atol=1e-9)
+        np.testing.assert_allclose(run.controllers[0].requested, plain.controllers[0].requested, rtol=1e-9, atol=1e-9)
         np.testing.assert_allclose(run.controllers[0].readings, plain.controllers[0].readings, rtol=1e-9, atol=1e-9)
 
 

@@ -223,7 +223,7 @@ def test_encoders_and_motors_must_be_as_many():
 def unstable(*controllers, duration=0.1):
     """What is said of the loop of a rotor at rest, its parts to the right of the colon."""
     sim = Simulation(model_from(tomllib.loads(STILL), "rotor.toml"), duration=duration, samples=11)
-    doubts = sim.run(list(controllers), warning=False).doubts
+    doubts = sim.run(list(controllers), warning=False).findings
     return [one.text for one in doubts if one.code == "loop-unstable"]
 
 

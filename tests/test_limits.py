@@ -114,7 +114,7 @@ def test_long_chains_that_may_be_and_keys_of_numbers(tmp_path):
     driven = f'[prescribed.drive]\njoint = "O"\ntable = {rows}\n[study]'
     model = pf.load(model_with(tmp_path, "[study]", driven, text))
     assert model.mechanism.bodies[0].mass == 2.0
-    assert len(model.mechanism.prescribed[0].law.times) == 200
+    assert len(model.mechanism.prescribed[0].profile.times) == 200
 
 
 def test_elements_and_shape_functions_are_bounded():
@@ -223,7 +223,7 @@ def test_a_tolerance_is_held_against_the_size_of_the_mechanism():
     def run(tolerance):
         return pf.simulate_motion(model.mechanism, 0.02, samples=3, options=pf.IntegrationOptions(tolerance=tolerance))
 
-    assert not [one for one in run(0.04 * size).doubts if one.code == "tolerance-loose"]
+    assert not [one for one in run(0.04 * size).findings if one.code == "tolerance-loose"]
     with pytest.warns(pf.ResultWarning, match=r"tolerance: .* m, in a mechanism of about 0.5 m: .*\[tolerance-loose\]"):
         run(0.06 * size)
     with pytest.raises(InputError, match=r"tolerance: larger than the mechanism, about 0.5 m \(got 2.0\)"):

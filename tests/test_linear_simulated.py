@@ -13,7 +13,7 @@ import paraflex as pf
 from paraflex.dynamics import State
 from paraflex.dynamics.projection import assemble, constraint_change, project
 from paraflex.dynamics.signals import moment_signals
-from paraflex.mechanism import LossFactor, TabulatedLaw, TorsionalDamper, TorsionalSpring
+from paraflex.mechanism import LossFactor, TabulatedProfile, TorsionalDamper, TorsionalSpring
 
 # Turn of the motors in a vibration [rad]: terms of second order are a part of this size.
 AMPLITUDE = 5e-7
@@ -48,7 +48,7 @@ def simulated(model, change, times, left=0.0):
     """Turns of the motors (k, 2) in a run from a changed state, with a change (k,) of the left motor's torque."""
     system, point = model.minimal.system, model.minimal.point
     mechanism, torques = system.mechanism, dict(zip(("left", "right"), point.torques.tolist(), strict=True))
-    torques["left"] = TabulatedLaw(tuple(times), tuple(torques["left"] + left + 0.0 * times))
+    torques["left"] = TabulatedProfile(tuple(times), tuple(torques["left"] + left + 0.0 * times))
     start = moved(model, change)
     run = pf.simulate_motion(
         mechanism, times[-1], samples=times.size, start=start, torques=torques, options=OPTIONS

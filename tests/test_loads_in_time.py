@@ -1,4 +1,4 @@
-"""Loads that are laws in time: closed forms, energy, inverse dynamics, statics, files, derivatives; what is refused."""
+"""Loads that vary in time: closed forms, energy, inverse dynamics, statics, files, derivatives; what is refused."""
 
 from dataclasses import replace
 
@@ -9,13 +9,13 @@ import paraflex as pf
 from paraflex.actuation import required_effort
 from paraflex.checks import check
 from paraflex.designs.derivatives.changes import Change
-from paraflex.designs.derivatives.plans import given, given_torques, nominal_values
+from paraflex.designs.derivatives.plans import inputs_with_torques, nominal_values, run_inputs
 from paraflex.designs.run import Task, plan_task
 from paraflex.dynamics import acting_loads, balanced_state, build_system, consistent_state, inputs_of
-from paraflex.dynamics.signals import law_signal, pack_signals
+from paraflex.dynamics.signals import pack_signals, profile_signal
 from paraflex.elastodynamics import simulate_ked
 from paraflex.errors import InputError
-from paraflex.files import ExpressionLaw, allowing_outside, library_file, load
+from paraflex.files import ExpressionProfile, allowing_outside, library_file, load
 from paraflex.integrators import IntegrationOptions
 from paraflex.integrators.run import jump_times
 from paraflex.integrators.sensitivity import run_derivatives
@@ -29,7 +29,7 @@ from paraflex.mechanism import (
     Material,
     Mechanism,
     Motor,
-    PiecewiseLaw,
+    PiecewiseProfile,
     PointForce,
     PointRef,
     PrescribedAngle,
@@ -37,16 +37,16 @@ from paraflex.mechanism import (
     RevoluteJoint,
     RigidBody,
     Section,
-    TabulatedLaw,
+    TabulatedProfile,
     TorsionalSpring,
     WeldJoint,
     raparm_i,
 )
-from paraflex.mechanism.laws import Interpolation
+from paraflex.mechanism.profiles import Interpolation
 from paraflex.motion import simulate_motion
 from paraflex.studies import load_sensitivities
 from paraflex.tracking import path_stops, plan_tracking
-from paraflex.validity.actions import doubtful_actions
+from paraflex.validity.actions import implausible_actions
 from shell import paraflex
 from test_loads import INERTIA, MASS, REACH, five_bar, pendulum
 from test_sensitivities import PLACES
@@ -59,8 +59,8 @@ def zero_until(time, value, until=None):
     """Nothing until a time, then a constant; nothing again after another."""
     pieces = [ConstantSpeed(0.0, 0.0), ConstantSpeed(value, 0.0)]
     if until is None:
-        return PiecewiseLaw(tuple(pieces), (time,))
-    return PiecewiseLaw((*pieces, ConstantSpeed(0.0, 0.0)), (time, until))
+        return PiecewiseProfile(tuple(pieces), (time,))
+    return PiecewiseProfile((*pieces, ConstantSpeed(0.0, 0.0)), (time, until))
 
 
 def slider(force, **changes):
@@ -77,7 +77,7 @@ def slider(force, **changes):
 
 @pytest.mark.parametrize("method", ["esdirk5", "radau", "bdf"])
 def test_an_oscillator_under_a_harmonic_force(method):
-    force = ExpressionLaw("F * sin(w * t)", {"F": FORCE, "w": PACE})
+    force = ExpressionProfile("F * sin(w * t)", {"F": FORCE, "w": PACE})
     mechanism = slider(force, springs=(TorsionalSpring("k", "rail", K),))
     run = simulate_motion(mechanism, 3.0, samples=61, options=IntegrationOptions(method=method, tolerance=1e-7))
     own = np.sqrt(K / MASS)
@@ -121,7 +121,7 @@ def test_a_beam_under_a_step_load_swings_to_twice_its_deflection():
 
 def test_a_torque_that_rises_turns_an_arm_with_the_cube_of_time():
     at_pin = INERTIA + MASS * REACH**2
-    twist = AppliedTorque("twist", PointRef("arm", "A"), ExpressionLaw("6 * c * t", {"c": 0.2}))
+    twist = AppliedTorque("twist", PointRef("arm", "A"), ExpressionProfile("6 * c * t", {"c": 0.2}))
     run = simulate_motion(pendulum(loads=(twist,)), 1.0, samples=11, options=IntegrationOptions(tolerance=1e-8))
     np.testing.assert_allclose(run.solution.q[:, 2], 0.5 + 0.2 * run.times**3 / at_pin, rtol=0, atol=1e-7)
 
@@ -129,9 +129,9 @@ def test_a_torque_that_rises_turns_an_arm_with_the_cube_of_time():
 @pytest.mark.parametrize(
     ("push", "within"),
     [
-        ((ExpressionLaw("3 * sin(30 * t)"), -5.0), 3e-7),
-        ((zero_until(0.08, 4.0, 0.13), ExpressionLaw("-40 * t")), 1e-7),
-        ((TabulatedLaw((0.0, 0.1, 0.2, 0.4), (0.0, 3.0, -2.0, 1.0)), 0.0), 1e-7),
+        ((ExpressionProfile("3 * sin(30 * t)"), -5.0), 3e-7),
+        ((zero_until(0.08, 4.0, 0.13), ExpressionProfile("-40 * t")), 1e-7),
+        ((TabulatedProfile((0.0, 0.1, 0.2, 0.4), (0.0, 3.0, -2.0, 1.0)), 0.0), 1e-7),
     ],
 )
 def test_torques_along_a_path_carry_loads_at_every_instant(push, within):
@@ -150,7 +150,7 @@ def test_torques_along_a_path_carry_loads_at_every_instant(push, within):
 def test_loads_in_time_are_as_constant_ones_where_they_are_constant():
     """Elastodynamics, finite segments and balanced starts, of which each takes forces in its own way."""
     line = Line((0.0, 0.264), (0.01, 0.264), 5.0)
-    forces = ((2.0, -3.0), (ExpressionLaw("2 + 0 * t"), ExpressionLaw("-3 + 0 * t")))
+    forces = ((2.0, -3.0), (ExpressionProfile("2 + 0 * t"), ExpressionProfile("-3 + 0 * t")))
     loaded = [replace(raparm_i(), loads=(PointForce("tool", PointRef("link4", "C"), force),)) for force in forces]
     tasks = [plan_tracking(mechanism, line, duration=0.05, samples=6) for mechanism in loaded]  # fmt: skip
     for of in (
@@ -164,7 +164,7 @@ def test_loads_in_time_are_as_constant_ones_where_they_are_constant():
 
 # A ramp from 0.1 to 0.2 s, a constant force, and a fall to nothing within a microsecond.
 RAMP = ((0.0, 0.1, 0.2, 0.5, 0.500001, 1.0), (0.0, 0.0, FORCE, FORCE, 0.0, 0.0))
-IN_PIECES = PiecewiseLaw(
+IN_PIECES = PiecewiseProfile(
     (
         ConstantSpeed(0.0, 0.0),
         ConstantSpeed(-FORCE, 10 * FORCE),
@@ -177,16 +177,16 @@ IN_PIECES = PiecewiseLaw(
 
 
 def test_a_linear_table_is_exact_at_its_rows_and_straight_between_them():
-    law, smooth = TabulatedLaw(*RAMP, "linear"), TabulatedLaw(*RAMP)
+    profile, smooth = TabulatedProfile(*RAMP, "linear"), TabulatedProfile(*RAMP)
     times = np.linspace(0.0, 1.0, 301)
-    for found, expected in zip(law.evaluate(times), IN_PIECES.evaluate(times), strict=True):
+    for found, expected in zip(profile.evaluate(times), IN_PIECES.evaluate(times), strict=True):
         np.testing.assert_allclose(found, expected, rtol=1e-9, atol=1e-9)
-    np.testing.assert_array_equal(law.evaluate(np.array(RAMP[0]))[0], RAMP[1])
-    assert law.knots == law.stops == RAMP[0][1:5]
+    np.testing.assert_array_equal(profile.evaluate(np.array(RAMP[0]))[0], RAMP[1])
+    assert profile.knots == profile.stops == RAMP[0][1:5]
     assert smooth.knots == ()
     # What it is for: a smooth curve leaves the rows far behind.
     assert np.max(smooth.evaluate(times)[0]) > 2 * FORCE
-    signal, ends = law_signal("load.push", law, 0.45)
+    signal, ends = profile_signal("load.push", profile, 0.45)
     np.testing.assert_array_equal(signal.breaks, [0.0, 0.1, 0.2, 0.45])
     np.testing.assert_allclose(signal.coefficients[:, :2], [[0, 0], [0, 10 * FORCE], [FORCE, 0]], rtol=1e-12, atol=0)
     assert ends == [0.1, 0.2]
@@ -196,8 +196,8 @@ def test_a_linear_table_is_exact_at_its_rows_and_straight_between_them():
 def test_a_jump_is_one_in_any_unit_and_rounding_is_none(scale):
     """A load from 0 to 1, to 1 + 1e-12, and back: the second is rounding, whatever the load is measured in."""
     heights = (0.0, 1.0, 1.0 + 1e-12, 0.0)
-    law = PiecewiseLaw(tuple(ConstantSpeed(scale * one, 0.0) for one in heights), (0.1, 0.2, 0.3))
-    mechanism = slider(law)
+    profile = PiecewiseProfile(tuple(ConstantSpeed(scale * one, 0.0) for one in heights), (0.1, 0.2, 0.3))
+    mechanism = slider(profile)
     signals, knots = pack_signals(mechanism, [], 0.4)
     np.testing.assert_array_equal(jump_times(signals, inputs_of(mechanism), np.array(knots)), [0.1, 0.3])
 
@@ -208,8 +208,8 @@ def test_an_oscillator_under_a_ramp_from_a_linear_table_and_the_same_in_pieces(m
     # Two runs, the steps of which need not be the same: each is within a tenth of what they are compared to.
     options = IntegrationOptions(method=method, tolerance=1e-9)
     table, pieces = (
-        simulate_motion(slider(law, springs=springs), 1.0, samples=41, options=options)
-        for law in (TabulatedLaw(*RAMP, "linear"), IN_PIECES)
+        simulate_motion(slider(profile, springs=springs), 1.0, samples=41, options=options)
+        for profile in (TabulatedProfile(*RAMP, "linear"), IN_PIECES)
     )
     np.testing.assert_allclose(table.solution.q, pieces.solution.q, rtol=0, atol=2e-8)
     own = np.sqrt(K / MASS)
@@ -226,12 +226,12 @@ def test_a_pulse_between_the_rows_of_a_long_linear_table_is_not_stepped_over():
     times, forces = np.linspace(0.0, 0.3, 3001), np.zeros(3001)
     forces[1000:1020] = 500.0
     forces += 1e-3 * np.sin(40.0 * times)
-    law = TabulatedLaw(tuple(times), tuple(forces), "linear")
+    profile = TabulatedProfile(tuple(times), tuple(forces), "linear")
     # Both ends of both flanks, though there are far more rows than stops.
-    assert {times[k] for k in (999, 1000, 1019, 1020)} <= set(law.stops)
-    assert len(law.stops) == 200
-    assert len(law.knots) == 2999
-    run = simulate_motion(slider(law), 0.3, samples=4)
+    assert {times[k] for k in (999, 1000, 1019, 1020)} <= set(profile.stops)
+    assert len(profile.stops) == 200
+    assert len(profile.knots) == 2999
+    run = simulate_motion(slider(profile), 0.3, samples=4)
     momentum = np.trapezoid(forces, times)
     np.testing.assert_allclose(run.solution.v[-1, 0], momentum / MASS, rtol=1e-8)
     assert run.solution.steps < 1000
@@ -240,8 +240,8 @@ def test_a_pulse_between_the_rows_of_a_long_linear_table_is_not_stepped_over():
 def test_torques_along_a_path_carry_a_long_linear_table():
     """Its rows are noise, so that no spline passes for them; steps end at few of them."""
     times = np.linspace(0.0, 0.2, 801)
-    law = TabulatedLaw(tuple(times), tuple(np.random.default_rng(3).uniform(-1.0, 1.0, times.size)), "linear")
-    mechanism = five_bar(loads=(PointForce("tool", PointRef("distal2", "C"), (law, 0.0)),))
+    profile = TabulatedProfile(tuple(times), tuple(np.random.default_rng(3).uniform(-1.0, 1.0, times.size)), "linear")
+    mechanism = five_bar(loads=(PointForce("tool", PointRef("distal2", "C"), (profile, 0.0)),))
     task = plan_tracking(mechanism, Line((0.0, 0.30), (0.04, 0.27), 20.0), duration=0.2, samples=41)
     run = task.simulate("++", options=IntegrationOptions(tolerance=1e-8))
     assert np.max(np.linalg.norm(run.driven.actual - run.driven.desired, axis=1)) < 1e-7
@@ -251,19 +251,23 @@ def test_torques_along_a_path_carry_a_long_linear_table():
     between = 0.5 * (times[1:] + times[:-1])[[7, 400, 790]]
     effort = required_effort(task.plan.follow(between)).required
     free = replace(task.plan.follow(between), mechanism=five_bar(), system=build_system(five_bar().rigid()))
-    np.testing.assert_allclose((required_effort(free).required - effort)[:, 0], np.interp(between, times, law.values))
+    np.testing.assert_allclose(
+        (required_effort(free).required - effort)[:, 0], np.interp(between, times, profile.values)
+    )
 
 
 def test_a_linear_table_is_as_its_pieces_in_elastodynamics_and_segments():
     line = Line((0.0, 0.264), (0.01, 0.264), 5.0)
-    pieces = PiecewiseLaw((ConstantSpeed(0.0, 100.0), ConstantSpeed(3.0, -50.0), ConstantSpeed(1.5, 0.0)), (0.02, 0.03))
-    table = TabulatedLaw((0.0, 0.02, 0.03, 0.05), (0.0, 2.0, 1.5, 1.5), "linear")
+    pieces = PiecewiseProfile(
+        (ConstantSpeed(0.0, 100.0), ConstantSpeed(3.0, -50.0), ConstantSpeed(1.5, 0.0)), (0.02, 0.03)
+    )
+    table = TabulatedProfile((0.0, 0.02, 0.03, 0.05), (0.0, 2.0, 1.5, 1.5), "linear")
     tasks = [
         plan_tracking(
-            replace(raparm_i(), loads=(PointForce("tool", PointRef("link4", "C"), (law, 0.0)),)),
+            replace(raparm_i(), loads=(PointForce("tool", PointRef("link4", "C"), (profile, 0.0)),)),
             line, duration=0.05, samples=6,
         )
-        for law in (pieces, table)
+        for profile in (pieces, table)
     ]  # fmt: skip
     for of in (
         lambda task: simulate_ked(task, "++++").solution.q,
@@ -275,7 +279,7 @@ def test_a_linear_table_is_as_its_pieces_in_elastodynamics_and_segments():
 
 
 def test_statics_take_a_load_at_the_time_of_the_pose():
-    mechanism = slider(ExpressionLaw("10 * t"), springs=(TorsionalSpring("k", "rail", K),))
+    mechanism = slider(ExpressionProfile("10 * t"), springs=(TorsionalSpring("k", "rail", K),))
     system = build_system(mechanism)
     for time in (0.0, 1.5):
         state = balanced_state(system, replace(consistent_state(system, mechanism.assembly()), time=time), {})
@@ -299,7 +303,7 @@ def test_inputs_are_motors_then_loads_then_prescribed_motions():
 
 def test_a_load_beyond_what_is_plausible_is_seen_at_its_largest():
     def codes(force):
-        return [one.code for one in doubtful_actions(slider(force), 0.5, MASS, np.linspace(0.0, 1.0, 3))]
+        return [one.code for one in implausible_actions(slider(force), 0.5, MASS, np.linspace(0.0, 1.0, 3))]
 
     # The pulse lies between the times that are looked at.
     assert codes(zero_until(0.6, 1e6, 0.61)) == codes(1e6) == ["load-large"]
@@ -308,15 +312,15 @@ def test_a_load_beyond_what_is_plausible_is_seen_at_its_largest():
 
 def test_only_motions_have_to_meet():
     jump = zero_until(0.1, 1.0)
-    with pytest.raises(InputError, match=r"prescribed\.turn\.pieces: the law jumps by 1 at t = 0\.1 s"):
+    with pytest.raises(InputError, match=r"prescribed\.turn\.pieces: the profile jumps by 1 at t = 0\.1 s"):
         PrescribedAngle("turn", "pin", jump)
-    assert PointForce("push", PointRef("arm", "B"), (jump, 0.0)).laws == (jump,)
+    assert PointForce("push", PointRef("arm", "B"), (jump, 0.0)).profiles == (jump,)
     with pytest.raises(
         InputError, match=r"prescribed\.turn\.interpolation: the rate of a motion between straight lines"
     ):
-        PrescribedAngle("turn", "pin", TabulatedLaw((0.0, 1.0), (0.0, 0.2), "linear"))
-    with pytest.raises(InputError, match=r"law\.interpolation: unknown interpolation \(got 'cubic'\)"):
-        TabulatedLaw((0.0, 1.0), (0.0, 0.2), "cubic")
+        PrescribedAngle("turn", "pin", TabulatedProfile((0.0, 1.0), (0.0, 0.2), "linear"))
+    with pytest.raises(InputError, match=r"profile\.interpolation: unknown interpolation \(got 'cubic'\)"):
+        TabulatedProfile((0.0, 1.0), (0.0, 0.2), "cubic")
 
 
 # --- Files --------------------------------------------------------------------------------------------------------
@@ -352,7 +356,7 @@ def written(folder, text):
 
 FORCE_AT = '[load.push]\ntype = "force"\npoint = "arm.B"\n'
 TORQUE_AT = '[load.push]\ntype = "torque"\npoint = "arm.B"\n'
-SINE = ExpressionLaw("a * sin(t)", {"a": 0.3})
+SINE = ExpressionProfile("a * sin(t)", {"a": 0.3})
 
 
 @pytest.mark.parametrize(
@@ -361,19 +365,22 @@ SINE = ExpressionLaw("a * sin(t)", {"a": 0.3})
         (FORCE_AT + 'force = ["a * sin(t)", "2 * a"]', (SINE, 0.6)),
         (
             FORCE_AT + 'pieces = [{ until = 0.5, force = [0, 1] }, { force = ["a * sin(t)", 1] }]',
-            (PiecewiseLaw((ConstantSpeed(0.0, 0.0), SINE), (0.5,)), 1.0),
+            (PiecewiseProfile((ConstantSpeed(0.0, 0.0), SINE), (0.5,)), 1.0),
         ),
-        (FORCE_AT + 'table = "force.csv"', (TabulatedLaw((0.0, 0.5, 1.0), (1.0, 3.0, 2.0)), 0.0)),
+        (FORCE_AT + 'table = "force.csv"', (TabulatedProfile((0.0, 0.5, 1.0), (1.0, 3.0, 2.0)), 0.0)),
         (
             FORCE_AT + 'table = "force.csv"\ninterpolation = "linear"',
-            (TabulatedLaw((0.0, 0.5, 1.0), (1.0, 3.0, 2.0), Interpolation.LINEAR), 0.0),
+            (TabulatedProfile((0.0, 0.5, 1.0), (1.0, 3.0, 2.0), Interpolation.LINEAR), 0.0),
         ),
-        (FORCE_AT + 'table = [[0, 1, 0], [1, 1, 1]]\ninterpolation = "spline"', (1.0, TabulatedLaw((0, 1), (0, 1)))),
+        (
+            FORCE_AT + 'table = [[0, 1, 0], [1, 1, 1]]\ninterpolation = "spline"',
+            (1.0, TabulatedProfile((0, 1), (0, 1))),
+        ),
         (TORQUE_AT + 'torque = "a * sin(t)"', (SINE,)),
-        (TORQUE_AT + 'table = "torque.csv"', (TabulatedLaw((0.0, 1.0), (0.0, 0.2)),)),
+        (TORQUE_AT + 'table = "torque.csv"', (TabulatedProfile((0.0, 1.0), (0.0, 0.2)),)),
         (
             TORQUE_AT + "pieces = [{ until = 0.5, torque = 1 }, { torque = 2 }]",
-            (PiecewiseLaw((ConstantSpeed(1.0, 0.0), ConstantSpeed(2.0, 0.0)), (0.5,)),),
+            (PiecewiseProfile((ConstantSpeed(1.0, 0.0), ConstantSpeed(2.0, 0.0)), (0.5,)),),
         ),
     ],
 )
@@ -428,9 +435,9 @@ def test_what_a_file_has_no_words_for_is_refused(tmp_path):
     mechanism = pendulum(loads=(PointForce("push", PointRef("arm", "B"), differing),))
     with pytest.raises(InputError, match=r"load\.push\.force: a model file cannot express a force whose components"):
         mechanism.save(tmp_path / "no.toml")
-    with pytest.raises(InputError, match=r"load\.push\.force: not a number or a law in time"):
+    with pytest.raises(InputError, match=r"load\.push\.force: not a number or a profile in time"):
         PointForce("push", PointRef("arm", "B"), ("t", 0.0))
-    differing = tuple(TabulatedLaw((0.0, 1.0), (0.0, 2.0), kind) for kind in ("spline", "linear"))
+    differing = tuple(TabulatedProfile((0.0, 1.0), (0.0, 2.0), kind) for kind in ("spline", "linear"))
     mechanism = pendulum(loads=(PointForce("push", PointRef("arm", "B"), differing),))
     with pytest.raises(InputError, match="tables of the same times and interpolation"):
         mechanism.save(tmp_path / "no.toml")
@@ -465,7 +472,7 @@ def study_of(folder, force, flexible=True):
 
 
 @pytest.mark.parametrize(("flexible", "follows"), [(True, 20.0), (True, 0.1), (False, 20.0)])
-def test_runs_have_derivatives_by_a_number_in_a_law_of_a_load(tmp_path, monkeypatch, flexible, follows):
+def test_runs_have_derivatives_by_a_number_in_a_profile_of_a_load(tmp_path, monkeypatch, flexible, follows):
     """Without flexible bodies the equations of motion are solved at samples within steps, where curves are 2 % off.
 
     So they are with flexible ones in steps that are long beside vibrations, which all are that count as such.
@@ -475,7 +482,7 @@ def test_runs_have_derivatives_by_a_number_in_a_law_of_a_load(tmp_path, monkeypa
     setting = study.setting
     task = Task(0, 0, nominal_values(study.setting), "line")
     planned, options = plan_task(setting, task)
-    nominal = given(planned, options, "++++")
+    nominal = run_inputs(planned, options, "++++")
     # Rigid links know their thickness by their mass alone.
     for k, step in enumerate([1e-2, 3e-4 if flexible else 3e-2]):
         change = Change(setting, task, planned, k, task.values[k]).of_mode(nominal)
@@ -487,7 +494,7 @@ def test_runs_have_derivatives_by_a_number_in_a_law_of_a_load(tmp_path, monkeypa
             values[k] *= 1.0 + place * step
             beside, _ = plan_task(setting, task._replace(values=tuple(values)))
             beside = replace(beside, system=build_system(beside.mechanism, like=planned.system))
-            near = given_torques(beside, options, feed_forward_like(beside.plan, nominal.torques))
+            near = inputs_with_torques(beside, options, feed_forward_like(beside.plan, nominal.torques))
             motions.append(run_derivatives(near.problem, options, []).motion)
         for kind, exact, parts in zip(found.motion._fields, found.derivatives, zip(*motions, strict=True), strict=True):
             expected = sum(weight * part for (_, weight), part in zip(PLACES, parts, strict=True)) / step
@@ -507,8 +514,8 @@ def test_loads_with_pieces_have_no_derivative_along_a_path(tmp_path, force):
     study = study_of(tmp_path, force)
     task = Task(0, 0, nominal_values(study.setting), "line")
     planned, options = plan_task(study.setting, task)
-    with pytest.raises(InputError, match="loads whose law has pieces or a linear table: no derivative"):
-        Change(study.setting, task, planned, 0, 5.0).of_mode(given(planned, options, "++++"))
+    with pytest.raises(InputError, match="loads whose profile has pieces or a linear table: no derivative"):
+        Change(study.setting, task, planned, 0, 5.0).of_mode(run_inputs(planned, options, "++++"))
 
 
 def test_an_arm_in_one_revolute_joint_is_what_the_file_says(tmp_path):
@@ -525,7 +532,7 @@ AT_PIN = INERTIA + MASS * REACH**2
 
 
 def test_torques_of_motors_in_time_do_the_work_that_the_arm_has():
-    torque = PiecewiseLaw((ConstantSpeed(0.0, 2.0), ConstantSpeed(-1.0, 0.0)), (0.4,))
+    torque = PiecewiseProfile((ConstantSpeed(0.0, 2.0), ConstantSpeed(-1.0, 0.0)), (0.4,))
     run = simulate_motion(pendulum(**DRIVEN), 1.0, samples=6, torques={"drive": torque})
     t = run.times
     rate = np.where(t < 0.4, t**2, 0.16 - (t - 0.4)) / AT_PIN
@@ -538,7 +545,7 @@ def test_torques_of_motors_in_time_do_the_work_that_the_arm_has():
     # The moment in the pin is the motor's.
     np.testing.assert_allclose(data["joint_moment"].values[:, 0], run.applied[:, 0], rtol=0, atol=1e-9)
     with pytest.raises(InputError, match=r"torques\.drive\.table: it covers t = 0 to 0\.5 s, the run goes to t = 1 s"):
-        simulate_motion(pendulum(**DRIVEN), 1.0, torques={"drive": TabulatedLaw((0.0, 0.5), (0.0, 1.0))})
+        simulate_motion(pendulum(**DRIVEN), 1.0, torques={"drive": TabulatedProfile((0.0, 0.5), (0.0, 1.0))})
 
 
 @pytest.mark.parametrize(
@@ -547,11 +554,11 @@ def test_torques_of_motors_in_time_do_the_work_that_the_arm_has():
         ("0.7", 0.7),
         ('"2 * a"', 0.6),
         ('"a * sin(t)"', SINE),
-        ("{ table = 'torque.csv' }", TabulatedLaw((0.0, 1.0), (0.0, 0.2))),
-        ("{ table = 'torque.csv', interpolation = 'linear' }", TabulatedLaw((0.0, 1.0), (0.0, 0.2), "linear")),
+        ("{ table = 'torque.csv' }", TabulatedProfile((0.0, 1.0), (0.0, 0.2))),
+        ("{ table = 'torque.csv', interpolation = 'linear' }", TabulatedProfile((0.0, 1.0), (0.0, 0.2), "linear")),
         (
             "{ pieces = [{ until = 0.5, torque = 'a * sin(t)' }, { torque = 0 }] }",
-            PiecewiseLaw((SINE, ConstantSpeed(0.0, 0.0)), (0.5,)),
+            PiecewiseProfile((SINE, ConstantSpeed(0.0, 0.0)), (0.5,)),
         ),
     ],
 )
@@ -643,7 +650,7 @@ def test_files_in_the_model_s_folder_are_quoted(tmp_path):
 
 @pytest.mark.parametrize("duration", [1e-3, 0.01, 0.1])
 def test_rounding_of_a_motion_that_has_hardly_begun_is_not_followed(duration):
-    """Of spin_up's law, over 15 s, all terms cancel at its start: 1e-3 s was refused, 0.01 s took 335,538 steps."""
+    """Of spin_up's profile, over 15 s, all terms cancel at its start: 1e-3 s was refused, 0.01 s took 335,538 steps."""
     run = simulate_motion(load("spin_up"), duration=duration, samples=11)
     assert run.solution.status == "complete"
     assert run.solution.steps < 200

@@ -10,9 +10,7 @@ from scipy.interpolate import CubicSpline
 
 from colours import APART, colour_distance
 from paraflex.figures.selection import moving_directions
-from paraflex.plots.labels import three_digits
 from paraflex.plots.layout import lay_out, panels
-from paraflex.plots.runs import draw_curves
 from paraflex.plots.scene import MAGNIFICATIONS, default_magnification, followed_station
 from paraflex.plots.style import journal_style
 from paraflex.plots.themes import THEMES
@@ -89,11 +87,11 @@ def test_the_trail_is_that_of_what_goes_farthest_where_nothing_is_free() -> None
 
 def figure_of(*labels: tuple[str, ...]) -> Figure:
     time = np.linspace(0.0, 1.0, 5)
-    run = xr.Dataset({"angle": (("time", "body"), np.zeros((5, 1)))}, coords={"time": time})
     with journal_style():
         figure, axes = panels(len(labels), 1)
         for panel, names in zip(axes[:, 0], labels, strict=True):
-            draw_curves(panel, run, {name: np.sin(time) for name in names})
+            for name in names:
+                panel.plot(time, np.sin(time), label=name)
         return lay_out(figure, axes, panel_height=30.0)
 
 
@@ -130,7 +128,6 @@ def test_rounding_errors_are_shown_as_nothing() -> None:
         lay_out(figure, axes, panel_height=30.0)
     assert axes[0, 0].get_ylim() == (-1.04, 1.04)
     assert axes[1, 0].get_ylim()[1] < 1e-5
-    assert [three_digits(value) for value in (1e-17, -2e-13, 0.0, 0.02)] == ["0", "0", "0", "0.0200"]
 
 
 def test_an_axis_along_which_nothing_moves_has_no_panel() -> None:

@@ -34,7 +34,7 @@ from paraflex.motion import simulate_motion
 from paraflex.results import open_results
 from paraflex.studies import ComparisonOptions, load_optimisation, load_sensitivities, load_sweep, sensitivities, sweep
 from paraflex.tracking import plan_tracking
-from paraflex.validity import to_blame
+from paraflex.validity import likely_cause
 from test_bad_input import broken
 
 
@@ -200,7 +200,7 @@ def test_a_modulus_in_gigapascals_is_named_by_the_error(tmp_path, monkeypatch, c
 
 def test_sound_numbers_are_not_blamed():
     mechanism = load("five_bar").mechanism
-    assert to_blame(mechanism, "proximal1 bends to a slope of 3 rad") == ""
+    assert likely_cause(mechanism, "proximal1 bends to a slope of 3 rad") == ""
 
 
 # --- The command line ----------------------------------------------------------------------------------------------

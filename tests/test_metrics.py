@@ -9,10 +9,9 @@ import pytest
 import paraflex as pf
 from paraflex.designs.measure import measure
 from paraflex.figures.designs import read_designs
-from paraflex.plots.labels import metric_name
 from paraflex.results import summary
 from paraflex.results.following import FOLLOWING, KEPT_METRICS
-from paraflex.results.metrics import METRICS, PATH
+from paraflex.results.metrics import METRICS, PATH, metric_label
 from paraflex.tracking import plan_tracking
 
 METRIC = "motor_power_max"
@@ -69,7 +68,7 @@ def test_a_metric_of_the_table_reaches_sweeps_and_figures(tmp_path, run):
     assert table[METRIC].item() == measure(run, (METRIC,))[METRIC]
     shown = read_designs([done.table])
     assert shown.labelled(METRIC) == ("largest motor power [W]", 1.0)
-    assert metric_name(METRIC) == "largest motor power"
+    assert metric_label(METRIC) == "largest motor power"
 
 
 def test_a_metric_of_the_table_has_derivatives(tmp_path, run):

@@ -15,10 +15,10 @@ from paraflex.dynamics.signals import InputSignals
 from paraflex.errors import InputError, IntegrationError, StiffnessWarning
 from paraflex.fem import ReferenceCondition
 from paraflex.integrators import METHODS, IntegrationOptions, integrate, make_problem
+from paraflex.integrators.external_methods import ExternalMethod
+from paraflex.integrators.external_run import largest_rate
 from paraflex.integrators.forms import OdeForm
-from paraflex.integrators.guests import Guest
 from paraflex.integrators.methods import BDF, RK45, find_method
-from paraflex.integrators.outside import largest_rate
 from paraflex.integrators.stepper import attempts
 from paraflex.mechanism import (
     Assembly,
@@ -34,7 +34,7 @@ from paraflex.mechanism import (
     Section,
 )
 
-GUESTS = [name for name, method in METHODS.items() if isinstance(method, Guest)]
+GUESTS = [name for name, method in METHODS.items() if isinstance(method, ExternalMethod)]
 KINDS = (*GUESTS, "ida ggl")
 END, JUMP = 0.2, 0.0731
 TIMES = np.linspace(0.0, END, 41)

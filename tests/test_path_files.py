@@ -1,4 +1,4 @@
-"""Paths of files: tables of points with a law of speed or with times, sequences; runs along them; what is refused."""
+"""Paths of files: tables of points with a speed profile or with times, sequences; runs along them; what is refused."""
 
 from dataclasses import replace
 
@@ -92,8 +92,8 @@ TABLE = '[path.p]\ntype = "table"\n'
     ("text", "says"),
     [
         (TABLE + "motion_time = 1", "path.p.table: "),
-        (TABLE + 'table = "drawn.csv"', "path.p.max_acceleration: its law of motion is not given; give max_acc"),
-        (TABLE + 'table = "timed.csv"\nmotion_time = 1', "path.p.motion_time: its law of motion is given in two ways"),
+        (TABLE + 'table = "drawn.csv"', "path.p.max_acceleration: its motion profile is not given; give max_acc"),
+        (TABLE + 'table = "timed.csv"\nmotion_time = 1', "path.p.motion_time: its motion profile is given in two ways"),
         (TABLE + 'table = "missing.csv"\nmotion_time = 1', "path.p.table: cannot be read (no such file or directory)"),
         (TABLE + 'table = "one.csv"\nmotion_time = 1', "path.p.table: line 1 of one.csv is not two or three numbers"),
         (TABLE + 'table = "ragged.csv"\nmotion_time = 1', "path.p.table: line 3 of ragged.csv is not two or three"),

@@ -1,4 +1,4 @@
-"""Paths: the law of section 6, derivatives that belong together, and rest where there should be rest."""
+"""Paths: the profile of section 6, derivatives that belong together, and rest where there should be rest."""
 
 from __future__ import annotations
 
@@ -12,14 +12,14 @@ from paraflex.arguments import with_fields
 from paraflex.errors import InputError
 from paraflex.kinematics import (
     Circle,
-    CruiseLaw,
+    CruiseProfile,
     Line,
     Path,
     PointPath,
     Polygon,
     SequencePath,
     TabulatedPath,
-    TrapezoidalLaw,
+    TrapezoidalProfile,
 )
 
 WAVE = tuple((0.05 * k, 0.1 * float(np.sin(0.9 * k))) for k in range(9))
@@ -48,18 +48,18 @@ def path(request):
     return PATHS[request.param]
 
 
-# --- The law -------------------------------------------------------------------------------------------------------
+# --- The profile ------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize(("length", "max_acceleration"), [(0.1, 40.0), (2.0, 0.3)])
-def test_law_covers_its_length_in_three_halves_of_a_period(length, max_acceleration):
-    law = TrapezoidalLaw(length, max_acceleration)
+def test_profile_covers_its_length_in_three_halves_of_a_period(length, max_acceleration):
+    profile = TrapezoidalProfile(length, max_acceleration)
     T = sqrt(pi * length / max_acceleration)
-    assert law.duration == pytest.approx(1.5 * T, rel=1e-15)
-    assert law.knots == pytest.approx((0.0, T / 2, T, 1.5 * T), rel=1e-15)
+    assert profile.duration == pytest.approx(1.5 * T, rel=1e-15)
+    assert profile.knots == pytest.approx((0.0, T / 2, T, 1.5 * T), rel=1e-15)
     # Eq. 63 as corrected: length a_max T^2/pi, cruise speed a_max T/pi.
     assert max_acceleration * T**2 / pi == pytest.approx(length, rel=1e-14)
-    s, speed, rate = law.evaluate(np.array([0.0, T / 4, T / 2, 0.7 * T, T, 1.25 * T, 1.5 * T]))
+    s, speed, rate = profile.evaluate(np.array([0.0, T / 4, T / 2, 0.7 * T, T, 1.25 * T, 1.5 * T]))
     cruise = max_acceleration * T / pi
     rising = max_acceleration * T / (2 * pi)
     np.testing.assert_allclose(speed, [0, rising, cruise, cruise, cruise, rising, 0], rtol=0, atol=1e-14 * cruise)
@@ -70,13 +70,13 @@ def test_law_covers_its_length_in_three_halves_of_a_period(length, max_accelerat
     np.testing.assert_allclose(s[[0, 2, 4, 6]], [0.0, length / 4, 3 * length / 4, length], rtol=0, atol=1e-14 * length)
 
 
-def test_acceleration_of_the_law_is_the_sine_of_equation_62():
-    law = TrapezoidalLaw(0.1, 40.0)
-    T = law.period
+def test_acceleration_of_the_profile_is_the_sine_of_equation_62():
+    profile = TrapezoidalProfile(0.1, 40.0)
+    T = profile.period
     t = np.linspace(0.0, 1.5 * T, 31)
     sine = 40.0 * np.sin(2 * pi * t / T)
     expected = np.where(t < T / 2, sine, np.where(t < T, 0.0, -sine))
-    np.testing.assert_allclose(law.evaluate(t)[2], expected, rtol=0, atol=1e-13 * 40.0)
+    np.testing.assert_allclose(profile.evaluate(t)[2], expected, rtol=0, atol=1e-13 * 40.0)
 
 
 def test_the_papers_square_takes_0_532_seconds():
@@ -196,8 +196,8 @@ def test_circles_keep_their_radius_and_sense(name, start, sweep):
     turned = np.unwrap(np.arctan2(arm[:, 1], arm[:, 0]))
     np.testing.assert_allclose(turned[[0, -1]], [start, start + sweep], rtol=0, atol=1e-13)
     assert np.all(np.diff(turned) * np.sign(sweep) > 0.0)
-    # Speed and the acceleration along the path are the law's, that across v^2/r towards the centre.
-    s, speed, rate = TrapezoidalLaw(0.15 * abs(sweep), 5.0).evaluate(t)
+    # Speed and the acceleration along the path are the profile's, that across v^2/r towards the centre.
+    s, speed, rate = TrapezoidalProfile(0.15 * abs(sweep), 5.0).evaluate(t)
     tangent = np.sign(sweep) * np.column_stack([-arm[:, 1], arm[:, 0]]) / 0.15
     np.testing.assert_allclose(np.abs(turned - start) * 0.15, s, rtol=0, atol=1e-14)
     np.testing.assert_allclose(np.sum(motion.velocity * tangent, axis=1), speed, rtol=0, atol=1e-13)
@@ -268,18 +268,18 @@ def test_a_path_that_cannot_be_made_names_the_field(make, field):
 
 
 @pytest.mark.parametrize(("length", "cruises"), [(0.5, True), (0.05, False)])
-def test_a_law_of_limited_speed_takes_the_time_of_its_ramps_and_its_cruise(length, cruises):
+def test_a_profile_of_limited_speed_takes_the_time_of_its_ramps_and_its_cruise(length, cruises):
     a, v = 2.0, 0.4
-    law = CruiseLaw(length, a, v)
-    t = np.linspace(0.0, law.duration, 4001)
-    s, speed, rate = law.evaluate(t)
+    profile = CruiseProfile(length, a, v)
+    t = np.linspace(0.0, profile.duration, 4001)
+    s, speed, rate = profile.evaluate(t)
     assert s[-1] == pytest.approx(length, rel=1e-12)
     assert np.max(np.abs(rate)) == pytest.approx(a, rel=1e-5)
     # A half sine of acceleration gives 2 a R / pi.
     ramp = np.pi * v / (2 * a) if cruises else np.sqrt(np.pi * length / (2 * a))
     assert np.max(speed) == pytest.approx(2 * a * ramp / np.pi, rel=1e-6)
     assert np.max(speed) <= v * (1 + 1e-12)
-    assert law.duration == pytest.approx(2 * ramp + (length / v - ramp if cruises else 0.0), rel=1e-12)
+    assert profile.duration == pytest.approx(2 * ramp + (length / v - ramp if cruises else 0.0), rel=1e-12)
     np.testing.assert_allclose(np.gradient(s, t)[1:-1], speed[1:-1], rtol=0, atol=1e-6)
     np.testing.assert_allclose(np.gradient(speed, t)[1:-1], rate[1:-1], rtol=0, atol=2e-3)
 
@@ -297,9 +297,9 @@ def test_a_curve_through_points_of_a_circle_is_followed_as_the_circle(places, wi
     t = np.linspace(0.0, circle.duration, 301)
     for found, expected, limit in zip(table.evaluate(t), circle.evaluate(t), within, strict=False):
         np.testing.assert_allclose(found, expected, rtol=0, atol=limit)
-    # The law is one along the length: the speed is the law's, whatever the points' distances.
+    # The profile is one along the length: the speed is the profile's, whatever the points' distances.
     speed = np.linalg.norm(table.evaluate(t).velocity, axis=1)
-    np.testing.assert_allclose(speed, TrapezoidalLaw(0.6, 5.0).evaluate(t)[1], rtol=0, atol=within[3])
+    np.testing.assert_allclose(speed, TrapezoidalProfile(0.6, 5.0).evaluate(t)[1], rtol=0, atol=within[3])
 
 
 @pytest.mark.parametrize("name", ["acceleration", "speed", "times"])
@@ -362,8 +362,8 @@ def test_a_sequence_is_its_paths_with_rest_between():
     [
         (lambda: TabulatedPath(WAVE[:3], motion_time=1.0), "points: not a list of points"),
         (lambda: TabulatedPath((*WAVE, WAVE[-1]), motion_time=1.0), "points: points 9 and 10 coincide"),
-        (lambda: TabulatedPath(WAVE), "max_acceleration: its law of motion is not given"),
-        (lambda: TabulatedPath(WAVE, motion_time=1.0, max_acceleration=1.0), "max_acceleration: its law of motion is"),
+        (lambda: TabulatedPath(WAVE), "max_acceleration: its motion profile is not given"),
+        (lambda: TabulatedPath(WAVE, motion_time=1.0, max_acceleration=1.0), "max_acceleration: its motion profile is"),
         (lambda: TabulatedPath(WAVE, motion_time=1.0, max_speed=1.0), "max_speed: a largest speed needs"),
         (lambda: TabulatedPath(WAVE, times=(0.0, 1.0)), "times: there are 9 points and 2 times"),
         (lambda: TabulatedPath(WAVE, times=(0, 1, 2, 2, 3, 4, 5, 6, 7)), "times: its times must ascend, but that of"),

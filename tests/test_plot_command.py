@@ -29,12 +29,12 @@ from paraflex.figures.designs import undominated
 from paraflex.formatting import logarithmic_number
 from paraflex.mechanism import Motor
 from paraflex.plots.catalogue import CATALOGUE, figure_names
-from paraflex.plots.labels import axis_label, metric_name
 from paraflex.plots.layout import MM, column_width
 from paraflex.plots.planned import drawings, figures_of, find_figure
 from paraflex.plots.save import write_figures
 from paraflex.plots.sources import Source, open_source
 from paraflex.results import motion_dataset, save_results, tracking_dataset
+from paraflex.results.metrics import metric_label
 from paraflex.studies import load_optimisation, load_sweep, optimise, sweep
 from processes import python
 from test_plots import STUDIES, stays_on_the_page
@@ -522,11 +522,7 @@ def test_all_figures_of_rigid_links_are_those_that_can_be_drawn(tmp_path: Path) 
 
 
 def test_one_name_a_quantity() -> None:
-    assert axis_label("torque") == r"torque $\tau$ [N m]"
-    assert axis_label("position", direction="y", short=True) == "$y$ [mm]"
-    assert axis_label("error", unit="µm") == "error [µm]"
-    assert axis_label("condition") == "condition number"
-    assert metric_name("peak_torque.tau1") == "peak torque of tau1"
+    assert metric_label("peak_torque.tau1") == "peak torque of tau1"
     assert [logarithmic_number(x) for x in (0.001, 5.0, 1e-5, 2e-5, 1e4)] == ["0.001", "5", "10⁻⁵", "2·10⁻⁵", "10⁴"]
 
 

@@ -19,7 +19,7 @@ from paraflex import plots
 from paraflex.errors import InputError, OutputError
 from paraflex.figures.selection import default_mode
 from paraflex.formatting import display_unit
-from paraflex.plots.labels import plain, symbol, three_digits
+from paraflex.plots.labels import plain, symbol
 from paraflex.units import DisplayUnit
 
 FULL, PARTIAL = "++", "+-"
@@ -468,4 +468,3 @@ def test_names_as_symbols() -> None:
         r"cost\$",
     ]
     assert [plain(name) for name in ("+-", "both", "one-by-one")] == ["+-", "both", "one-by-one"]
-    assert [three_digits(value) for value in (48.0, 0.37712, 120.4, 0.0)] == ["48.0", "0.377", "120", "0"]

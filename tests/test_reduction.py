@@ -11,7 +11,7 @@ import scipy.linalg
 
 import paraflex as pf
 from paraflex.checks import check
-from paraflex.dynamics import build_system, missed_turns
+from paraflex.dynamics import build_system, missing_rotations
 from paraflex.errors import InputError
 from paraflex.fem import ReferenceCondition
 from paraflex.files import load
@@ -30,7 +30,7 @@ def clamped(reference, modes):
 
 @pytest.mark.parametrize("modes", [1, 2, 4, 8])
 def test_modes_of_the_pinned_frame_miss_the_turn_of_a_clamped_end(modes):
-    (missed,) = missed_turns(build_system(clamped(PINNED, modes)))
+    (missed,) = missing_rotations(build_system(clamped(PINNED, modes)))
     assert (str(missed.point), missed.cause, missed.modes) == ("beam.A", "the weld A", modes)
     # Of a beam on two pins: L / 3EI in all, 2 L / (n pi)^2 EI from its mode n.
     exact = 1.0 - 6.0 / np.pi**2 * np.sum(1.0 / np.arange(1, modes + 1) ** 2)
@@ -51,7 +51,7 @@ def test_modes_of_the_pinned_frame_miss_the_turn_of_a_clamped_end(modes):
 def test_a_clamped_beam_is_too_stiff_by_what_they_miss(reference, modes, off):
     frequencies, _ = vibrations(clamped(reference, modes))
     assert frequencies[0] / (1.8751041**2 * unit_frequency()) - 1.0 == pytest.approx(off, rel=0.03, abs=1e-5)
-    assert bool(missed_turns(build_system(clamped(reference, modes)))) == (off > 0.0)
+    assert bool(missing_rotations(build_system(clamped(reference, modes)))) == (off > 0.0)
 
 
 def bending(mechanism, force=0.0, moment=0.0):
@@ -103,8 +103,8 @@ def test_the_table_in_theory_md(reference, modes, errors):
 
 
 def test_pins_and_whole_beams_are_not_complained_of():
-    assert not missed_turns(build_system(held(beam(PINNED, None, modes=1), ("pin", "pin"))))
-    assert not missed_turns(build_system(held(beam(PINNED, None), ("weld", "drive"))))
+    assert not missing_rotations(build_system(held(beam(PINNED, None, modes=1), ("pin", "pin"))))
+    assert not missing_rotations(build_system(held(beam(PINNED, None), ("weld", "drive"))))
 
 
 def test_info_complains_of_a_beam_that_is_too_stiff_under_its_motor():
@@ -147,7 +147,7 @@ def test_static_shapes_carry_moments_and_forces_exactly(reference):
     few = with_static_shapes(mechanism, 0, reference)
     # Stretch, force and moment at the end.
     assert build_system(few).n_flexible == 3
-    assert not missed_turns(build_system(few))
+    assert not missing_rotations(build_system(few))
     for given in ({"force": 1.0}, {"moment": 1.0}):
         assert bending(few, **given) == pytest.approx(bending(mechanism, **given), rel=1e-9)
 
@@ -200,6 +200,6 @@ def test_runs_complain_too():
     reduced = replace(model, mechanism=model.mechanism.with_beams(reference=PINNED, modes=2))
     with pytest.warns(pf.ResultWarning, match=r"body\.beam\.modes: 2 modes miss 24 % .*craig-bampton"):
         run = pf.simulate_motion(reduced, 0.1, samples=11)
-    assert "modes-too-stiff" in [one.code for one in run.doubts]
+    assert "modes-too-stiff" in [one.code for one in run.findings]
     sound = pf.simulate_motion(replace(model, mechanism=with_static_shapes(model.mechanism, 2)), 0.1, samples=11)
-    assert "modes-too-stiff" not in [one.code for one in sound.doubts]
+    assert "modes-too-stiff" not in [one.code for one in sound.findings]

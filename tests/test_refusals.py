@@ -18,12 +18,11 @@ from paraflex.integrators.run import make_problem
 from paraflex.integrators.sensitivity import check_differentiable
 from paraflex.integrators.spectra import spectrum
 from paraflex.motion import simulate_motion
-from paraflex.plots import link_deflections, mode_conditions
+from paraflex.plots import end_effector_path, link_deflections, mode_conditions
 from paraflex.plots.film import FilmOptions, plan_film
 from paraflex.plots.planned import drawings, figures_of, find_figure
 from paraflex.plots.scene import check_shapes, scene, select
 from paraflex.plots.sources import open_source
-from paraflex.plots.workspace import deviated_paths
 from paraflex.results import motion_dataset, save_results, tracking_dataset
 
 
@@ -65,8 +64,8 @@ def test_figures_of_models_and_magnifications(tracking):
     runs = tracking.expand_dims(model=["linear"])
     refused(lambda: select_model(runs, "rigid"), "model", "no such model in these results", "one of linear")
     refused(lambda: select(runs, None, "rigid"), "model", "no such model in these results", "choose from linear")
-    run = {"++++": tracking.isel(mode=0)}
-    refused(lambda: deviated_paths(run, magnification=-1.0), "magnification", "not a magnification", "positive number")
+    refused(lambda: end_effector_path(tracking, magnification=-1.0), "magnification", "not a magnification",
+            "positive number")  # fmt: skip
 
 
 def test_figures_that_are_not_there(motion, tmp_path):

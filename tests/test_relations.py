@@ -159,7 +159,7 @@ def test_two_motors_move_a_carriage_by_belts(corexy):
     turning = data["joint_moment"].sel(joint="A").values
     np.testing.assert_allclose(turning, J * acceleration.sum() / RADIUS, rtol=1e-6)
     assert run.solution.energy_balance_max < 1e-9
-    assert run.doubts == ()
+    assert run.findings == ()
 
 
 def test_a_plan_shares_torques_between_the_belts(corexy):

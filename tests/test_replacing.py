@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from paraflex.cli import app as program
-from paraflex.cli.replacing import say_replaced
+from paraflex.cli.replacing import print_replaced
 
 SHORT = ["five_bar", "--duration", "0.05", "--samples", "11"]
 RUN = ["run", *SHORT, "--mode", "++", "--tol", "1e-3", "--rigid", "--no-report"]
@@ -145,16 +145,16 @@ def test_sensitivities_made_again_are_named(paraflex, monkeypatch, tmp_path):
 def test_damaged_results_are_named_by_their_kind(tmp_path, capsys, text):
     (tmp_path / "summary.json").write_text(text)
     date = dated(tmp_path, ["summary.json"])
-    say_replaced(tmp_path)
+    print_replaced(tmp_path)
     said = " ".join(capsys.readouterr().err.split())
     assert said.endswith(f"holds a run, {date}; it will be replaced (--out another folder keeps both)")
 
 
 def test_other_files_are_named(tmp_path, capsys):
-    say_replaced(tmp_path)
+    print_replaced(tmp_path)
     assert capsys.readouterr().err == ""
     for name in "abcde":
         (tmp_path / name).write_text("mine")
-    say_replaced(tmp_path)
+    print_replaced(tmp_path)
     said = capsys.readouterr().err
     assert said == f"{tmp_path} holds files not written by paraflex, which stay: a, b, c and 2 more\n"

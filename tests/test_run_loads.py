@@ -203,7 +203,7 @@ def test_stresses_are_in_tables_and_summary_and_on_the_page(crank, data, tmp_pat
     assert loads["joints"][slider_joint(data)]["unit"] == "m"
     # Below one, which is said three times.
     assert loads["beams"]["rod"]["safety_factor"] < 1.0
-    (over,) = [one for one in crank.doubts if one.code == "stress-over-strength"]
+    (over,) = [one for one in crank.findings if one.code == "stress-over-strength"]
     assert " rad/s, " in over.remedy
     assert " rpm)" in over.remedy
     page = motion_page(data)

@@ -31,7 +31,7 @@ def shaper(tmp_path_factory):
 
 
 def coarse(run):
-    return [one for one in run.doubts if one.code == CODE]
+    return [one for one in run.findings if one.code == CODE]
 
 
 def largest(run):
@@ -108,7 +108,7 @@ def test_times_between_are_left_out_where_they_would_take_too_much_memory():
     times = np.linspace(0.0, 1.0, 701)
     near = with_between(times, build_system(pf.load("five_bar").mechanism).n)
     assert near is not None
-    np.testing.assert_array_equal(near.times[near.asked], times)
+    np.testing.assert_array_equal(near.times[near.stored], times)
     assert near.times.size == 1401
     assert np.all(np.diff(near.times) > 0.0)
     assert with_between(times, 10_000) is None

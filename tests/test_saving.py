@@ -13,7 +13,7 @@ from pages import blocks_of
 from paraflex.dynamics import build_system, start_state
 from paraflex.errors import InputError, OutputError
 from paraflex.fem import Polynomial, Sine
-from paraflex.files import ExpressionLaw, StudyDefaults, library_names, library_text, load_data, model_from
+from paraflex.files import ExpressionProfile, StudyDefaults, library_names, library_text, load_data, model_from
 from paraflex.files.document import document_text
 from paraflex.mechanism import (
     Assembly,
@@ -29,7 +29,7 @@ from paraflex.mechanism import (
     ModalBody,
     ModalDamping,
     ModalPoint,
-    PiecewiseLaw,
+    PiecewiseProfile,
     PointForce,
     PointRef,
     PrescribedAngle,
@@ -41,7 +41,7 @@ from paraflex.mechanism import (
     Section,
     SlidingJoint,
     Start,
-    TabulatedLaw,
+    TabulatedProfile,
     TorsionalSpring,
 )
 from paraflex.motion import simulate_motion
@@ -238,13 +238,13 @@ def everything():
         RevoluteJoint("P", PointRef("ground", "P"), PointRef("ritz", "P")),
         RevoluteJoint("E", PointRef("ground", "E"), PointRef("modal", "E")),
     )
-    expression = ExpressionLaw("a * sin(w * t)", {"a": 0.1, "w": 2.0, "of others": 3.0})
-    pieces = PiecewiseLaw((ConstantSpeed(0.0, 0.0), ExpressionLaw("b * (t - 1)**3", {"b": 0.5})), (1.0,))
+    expression = ExpressionProfile("a * sin(w * t)", {"a": 0.1, "w": 2.0, "of others": 3.0})
+    pieces = PiecewiseProfile((ConstantSpeed(0.0, 0.0), ExpressionProfile("b * (t - 1)**3", {"b": 0.5})), (1.0,))
     return pf.Mechanism(
         'every "kind"', ground, (beam, ritz, modal, bead), joints,
         prescribed=(
             PrescribedAngle("turn", "P", expression), PrescribedAngle("slide", "wire", pieces),
-            PrescribedAngle("swing", "E", TabulatedLaw((0.0, 0.1, 0.3), (0.0, 0.01, 0.05))),
+            PrescribedAngle("swing", "E", TabulatedProfile((0.0, 0.1, 0.3), (0.0, 0.01, 0.05))),
         ),
         springs=(TorsionalSpring("s", "A", 2.0, 0.1),),
         linear_springs=(LinearSpring("l", PointRef("ground", "wall"), PointRef("bead", "C"), 10.0, 4.0, 0.1),),
@@ -270,14 +270,14 @@ def test_every_kind_of_member(tmp_path):
 
 
 def test_a_piece_of_constant_speed_is_an_expression(tmp_path):
-    law = PiecewiseLaw((ConstantSpeed(0.5, 2.0), ExpressionLaw("0.5 + 2 * t")), (1.0,))
+    profile = PiecewiseProfile((ConstantSpeed(0.5, 2.0), ExpressionProfile("0.5 + 2 * t")), (1.0,))
     pendulum = library("pendulum").mechanism
     joint = pendulum.joints[0].name
-    driven = replace(pendulum, prescribed=(PrescribedAngle("drive", joint, law),), loads=(), motors=(), modes=())
+    driven = replace(pendulum, prescribed=(PrescribedAngle("drive", joint, profile),), loads=(), motors=(), modes=())
     pf.Model(driven).save(tmp_path / "pieces.toml")
     (again,) = read(tmp_path / "pieces.toml").mechanism.prescribed
     t = np.linspace(0.0, 2.0, 9)
-    for one, other in zip(again.law.evaluate(t), law.evaluate(t), strict=True):
+    for one, other in zip(again.profile.evaluate(t), profile.evaluate(t), strict=True):
         np.testing.assert_array_equal(one, other)
 
 
@@ -285,28 +285,32 @@ def flat(t):
     return 0.0 * t
 
 
-LAW = SampledAngle(flat, flat, flat)
+PROFILE = SampledAngle(flat, flat, flat)
 
 
 @pytest.mark.parametrize(
     ("change", "message"),
     [
         (
-            {"prescribed": (PrescribedAngle("turn", "P", LAW),)},
-            r"^prescribed.turn.law: a model file cannot express this law \(got 'SampledAngle'\); give a Constant",
-        ),
-        (
-            {"prescribed": (PrescribedAngle("turn", "P", PiecewiseLaw((LAW, ConstantSpeed(0.0, 0.0)), (1.0,))),)},
-            "^prescribed.turn.law: a model file cannot express this law",
+            {"prescribed": (PrescribedAngle("turn", "P", PROFILE),)},
+            r"^prescribed.turn.profile: a model file cannot express this profile \(got 'SampledAngle'\); give a",
         ),
         (
             {
                 "prescribed": (
-                    PrescribedAngle("turn", "P", ExpressionLaw("a * t", {"a": 1.0})),
-                    PrescribedAngle("swing", "E", ExpressionLaw("a * t", {"a": 2.0})),
+                    PrescribedAngle("turn", "P", PiecewiseProfile((PROFILE, ConstantSpeed(0.0, 0.0)), (1.0,))),
                 )
             },
-            r'^prescribed.swing.law: a file has one value of the parameter "a", and laws have 1.0 and 2.0',
+            "^prescribed.turn.profile: a model file cannot express this profile",
+        ),
+        (
+            {
+                "prescribed": (
+                    PrescribedAngle("turn", "P", ExpressionProfile("a * t", {"a": 1.0})),
+                    PrescribedAngle("swing", "E", ExpressionProfile("a * t", {"a": 2.0})),
+                )
+            },
+            r'^prescribed.swing.profile: a file has one value of the parameter "a", but profiles have 1.0, 2.0',
         ),
         ({"name": "\ud800"}, "^name: not text in UTF-8"),
     ],
@@ -375,10 +379,10 @@ def test_what_the_pages_on_model_files_show_runs(name, count, tmp_path, monkeypa
     assert len(read("chain.toml").mechanism.bodies) == 5
 
 
-def test_an_expression_law_names_what_is_wrong():
+def test_an_expression_profile_names_what_is_wrong():
     with pytest.raises(InputError, match=r'^angle: unknown parameter "w" .*choose from v'):
-        ExpressionLaw("sin(w * t)", {"v": 1.0})
-    assert ExpressionLaw("v * t + pi", {"v": 1.0, "unused": 2.0}).evaluate(np.ones(1))[0] == 1.0 + pi
+        ExpressionProfile("sin(w * t)", {"v": 1.0})
+    assert ExpressionProfile("v * t + pi", {"v": 1.0, "unused": 2.0}).evaluate(np.ones(1))[0] == 1.0 + pi
 
 
 @pytest.mark.parametrize("name", NAMES)

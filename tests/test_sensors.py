@@ -22,8 +22,8 @@ from paraflex.dynamics import (
     static_equilibrium,
 )
 from paraflex.dynamics.joint_loads import joint_loads
+from paraflex.dynamics.modal_truncation import missing_rotations
 from paraflex.dynamics.points import marker_position, point_motion
-from paraflex.dynamics.reduction import missed_turns
 from paraflex.dynamics.state import reference_pose
 from paraflex.elastodynamics import simulate_ked
 from paraflex.errors import InputError
@@ -511,7 +511,7 @@ def test_sensors_do_not_act():
     assert build_system(mechanism).rows == build_system(plain).rows
     # A sensor turns nothing that a reduced beam could not follow.
     few = dataclasses.replace(model_from(PENDULUM, "p.toml").mechanism.with_beams(modes=1), motors=())
-    assert not missed_turns(build_system(few))
+    assert not missing_rotations(build_system(few))
 
 
 def test_a_motion_holds_its_readings(tmp_path):
@@ -619,7 +619,7 @@ def two_points(read, location=None):
     """A sensor of a user's own: something between two points of the pendulum's rod."""
 
     @dataclass(frozen=True)
-    class Between(Sensor, kind="between", units=("m",)):
+    class RefinedTimes(Sensor, kind="between", units=("m",)):
         point: pf.PointRef
 
         def read(self, moving):
@@ -629,7 +629,7 @@ def two_points(read, location=None):
         def location(self):
             return Location(point=self.point) if location is None else location
 
-    return Between("own", pf.PointRef("rod", "T"))
+    return RefinedTimes("own", pf.PointRef("rod", "T"))
 
 
 def pendulum_with(sensor):

@@ -179,7 +179,7 @@ def test_values_may_be_numpy_ones_and_names_of_files(tmp_path):
     )
     (tmp_path / "rotor.toml").write_text(text)
     (drive,) = pf.load(tmp_path / "rotor.toml", set={"drive.table": "rows.csv"}).mechanism.prescribed
-    assert list(drive.law.values) == [0.0, 0.5, 1.0]
+    assert list(drive.profile.values) == [0.0, 0.5, 1.0]
 
 
 def test_a_sensitivity_is_taken_at_values_with_units(tmp_path):

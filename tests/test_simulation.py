@@ -165,7 +165,7 @@ def test_restored_runs_have_the_same_bits(task):
     again = sim.run()
     for name in ("t", "q", "v", "a", "multipliers", "work"):
         assert np.array_equal(getattr(again.solution, name), getattr(whole.solution, name)), name
-    assert np.array_equal(again.controllers[0].given, whole.controllers[0].given)
+    assert np.array_equal(again.controllers[0].applied, whole.controllers[0].applied)
     assert np.array_equal(again.applied, whole.applied)
     assert again.solution.steps == whole.solution.steps
 
@@ -177,7 +177,7 @@ def test_a_run_is_a_reference(task):
     run = sim.run(SampledController(lambda k, t, y: 0.0 * y, period=T), warning=False)
     for reference, least, most in ((run, 0.0, 1e-7), ("plan", 1e-5, 1.0)):
         law = SampledController(lambda k, t, y: 1e-12 * y, period=T, reference=reference)
-        errors = sim.run(law, warning=False).controllers[0].wanted / 1e-12
+        errors = sim.run(law, warning=False).controllers[0].requested / 1e-12
         assert least <= np.max(np.abs(errors)) < most
     with pytest.raises(pf.errors.InputError, match=r"reference: unknown sensor .*hub"):
         simulated_rotor().run(SampledController(lambda k, t, y: y, period=T, inputs=["hub"], reference=run))
@@ -239,9 +239,9 @@ def test_readings_are_quantised_and_torques_limited():
     run = simulated_rotor().run(pd(quantise={"hub": 0.01}, limits=30.0, rates=5e3))
     (record,) = run.controllers
     assert np.allclose(record.readings[:, 0] / 0.01, np.round(record.readings[:, 0] / 0.01), atol=1e-9)
-    assert record.given[0, 0] == -5.0  # a rate of 5000 N m/s from zero
-    assert np.max(np.abs(np.diff(record.given[:, 0]))) <= 5.0 + 1e-12
-    assert np.max(np.abs(record.given)) <= 30.0
+    assert record.applied[0, 0] == -5.0  # a rate of 5000 N m/s from zero
+    assert np.max(np.abs(np.diff(record.applied[:, 0]))) <= 5.0 + 1e-12
+    assert np.max(np.abs(record.applied)) <= 30.0
     assert record.limited[0]
 
 

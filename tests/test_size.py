@@ -171,14 +171,14 @@ def test_a_welded_beam_of_any_size(L, thickness, elements):
     assert not undetermined_loads(system, ["O"], start.q[None]).force.any()
 
 
-def beam_of(size, ends, law=None):
+def beam_of(size, ends, profile=None):
     """A damped steel beam of a length, its section and load scaled alike."""
     beam = FlexibleBeam("beam", size, Section.rectangle(0.02 * size, 0.01 * size), Material(2.1e11, 7850.0),
                         {"A": 0.0, "M": 0.5 * size, "B": size}, 2, damping=ModalDamping((0.01,)))  # fmt: skip
     return Mechanism(
         name="beam", ground={"O": (0.0, 0.0), "P": (size, 0.0)}, bodies=(beam,), joints=ends,
-        assemblies=(Assembly("a", {"beam": 0.0}),), prescribed=(law,) if law else (),
-        loads=() if law else (PointForce("p", PointRef("beam", "M"), (0.0, LOAD * size**2)),),
+        assemblies=(Assembly("a", {"beam": 0.0}),), prescribed=(profile,) if profile else (),
+        loads=() if profile else (PointForce("p", PointRef("beam", "M"), (0.0, LOAD * size**2)),),
     )  # fmt: skip
 
 
@@ -202,8 +202,8 @@ def test_balanced_starts_are_those_of_beam_theory_at_any_size(size):
 def test_a_turning_beam_is_balanced_at_any_size(size):
     """It pulls at its pin by rho A L^2 omega^2 / 2, and needs no torque. At 100 m it was 0.7 % off."""
     rate = 5.25 / size
-    law = PrescribedAngle("drive", "O", ConstantSpeed(0.0, rate))
-    mechanism = beam_of(size, (RevoluteJoint("O", PointRef("ground", "O"), PointRef("beam", "A")),), law)
+    profile = PrescribedAngle("drive", "O", ConstantSpeed(0.0, rate))
+    mechanism = beam_of(size, (RevoluteJoint("O", PointRef("ground", "O"), PointRef("beam", "A")),), profile)
     data = motion_dataset(simulate_motion(mechanism, 0.1 / rate, samples=11, balanced=True, warning=False))
     pull = 7850.0 * 2e-4 * size**2 * (size * rate) ** 2 / 2.0
     np.testing.assert_allclose(np.linalg.norm(data["joint_force"].values[:, 0], axis=-1), pull, rtol=3e-4)

@@ -16,9 +16,9 @@ from paraflex.dynamics import (
     build_system,
     closure_of,
     consistent_state,
+    driven_freedoms,
     mobility,
     natural_frequencies,
-    reach,
     undeformed,
 )
 from paraflex.dynamics.signals import moment_signals
@@ -181,7 +181,7 @@ def test_sets_of_motors_are_those_whose_matrix_has_full_rank(raparm):
     """Against B = Z^T S by a null space, motor set by motor set."""
     mechanism = replace(raparm.rigid(), modes=(*raparm.modes, ActuationMode("one", ("tau1",))))
     system, start, free = seen(mechanism)
-    found = reach(system, start.state, free.freedoms)
+    found = driven_freedoms(system, start.state, free.freedoms)
     basis = np.linalg.svd(system.jacobian(start.state.q))[2][-2:].T
     S = np.array([twins.joint_angle_row(system, motor.joint) for motor in mechanism.motors]).T
     names = [motor.name for motor in mechanism.motors]
@@ -200,10 +200,10 @@ def test_motors_on_one_joint_reach_no_more_than_one():
     five_bar = make_five_bar()
     mechanism = replace(five_bar, motors=(Motor("a", "A1"), Motor("b", "A1"), Motor("c", "A2")))
     system, start, free = seen(mechanism)
-    assert reach(system, start.state, free.freedoms).sets == (("a", "c"), ("b", "c"))
+    assert driven_freedoms(system, start.state, free.freedoms).sets == (("a", "c"), ("b", "c"))
     stuck = replace(mechanism, motors=mechanism.motors[:2])
     system, start, free = seen(stuck)
-    found = reach(system, start.state, free.freedoms)
+    found = driven_freedoms(system, start.state, free.freedoms)
     assert (found.all_motors, found.sets) == (1, ())
 
 
@@ -269,7 +269,7 @@ def test_frequencies_of_info_are_those_of_the_pose_asked_for(raparm):
 
 def test_a_time_leads_along_prescribed_angles_or_nowhere():
     four_bar = load("four_bar")
-    speed = four_bar.mechanism.prescribed[0].law.evaluate(np.zeros(1))[1].item()
+    speed = four_bar.mechanism.prescribed[0].profile.evaluate(np.zeros(1))[1].item()
     here, round_, half = (
         describe(four_bar, InfoRequest(at=t))["frequencies"]["motors_free_hz"]
         for t in (0.0, 2 * np.pi / speed, np.pi / speed)

@@ -44,7 +44,7 @@ def acceleration(t, w_s=1.0):
 
 def spin(w_s, geometry, end, tolerance, reference=ReferenceCondition.CANTILEVER):
     """The system and its motion, sampled every 10 ms, finer near the deepest deflection at unit speed."""
-    law = SampledAngle(*(partial(f, w_s=w_s) for f in (angle, rate, acceleration)), knots=(RAMP,))
+    profile = SampledAngle(*(partial(f, w_s=w_s) for f in (angle, rate, acceleration)), knots=(RAMP,))
     beam = FlexibleBeam(
         name="beam",
         length=LENGTH,
@@ -59,7 +59,7 @@ def spin(w_s, geometry, end, tolerance, reference=ReferenceCondition.CANTILEVER)
         ground={"O": (0.0, 0.0)},
         bodies=(beam,),
         joints=(RevoluteJoint("root", PointRef("ground", "O"), PointRef("beam", "root")),),
-        prescribed=(PrescribedAngle("spin", "root", law),),
+        prescribed=(PrescribedAngle("spin", "root", profile),),
         assemblies=(Assembly("start", {"beam": 0.0}),),
         geometry=geometry,
     )
@@ -106,7 +106,7 @@ def test_work_of_the_prescribed_angle_is_the_energy(spin_up):
     assert energy[-1] == pytest.approx(200.0, rel=0.01)
 
 
-def test_root_follows_the_law(spin_up):
+def test_root_follows_the_profile(spin_up):
     _, solution = spin_up
     assert solution.q[:, 2] == pytest.approx(angle(solution.t), abs=1e-6)
     assert solution.v[:, 2] == pytest.approx(rate(solution.t), abs=1e-5)

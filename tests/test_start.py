@@ -217,7 +217,7 @@ def test_velocities_that_joints_do_not_allow_are_refused_with_the_residual(start
         start_state(build_system(mechanism), start, mechanism.assembly())
 
 
-def test_a_prescribed_law_is_not_contradicted_silently():
+def test_a_prescribed_profile_is_not_contradicted_silently():
     mechanism = load("four_bar").mechanism
     system = build_system(mechanism)
     with pytest.raises(InputError, match=r"start\.velocity\.angular\.crank: .* contradict each other"):

@@ -86,7 +86,7 @@ def test_beyond_its_load_a_column_is_unstable_and_the_motion_that_grows_is_told(
         found = pf.statics(column("pinned", "pinned"), loads={"column.B.y": -load}, steps=4)
     assert found.stable.tolist() == [True, True, True, True, False]
     assert found.buckling[0, 0] == pytest.approx(1.0 / 1.2, rel=1e-5)
-    assert found.doubts[0].code == "equilibrium-unstable"
+    assert found.findings[0].code == "equilibrium-unstable"
 
 
 def test_buckling_shapes_are_those_of_euler() -> None:

@@ -178,7 +178,7 @@ def test_expressions_take_coordinates_in_all_steps_and_have_their_units():
     }  # fmt: skip
     got = measure(found, list(wanted))
     assert got == pytest.approx(wanted, rel=1e-12)
-    members = members_of(found.system.described, found.equations.given)
+    members = members_of(found.system.described, found.equations.conditions)
     assert [metric_unit(name, members) for name in list(wanted)[::3]] == ["m", "N"]
 
 

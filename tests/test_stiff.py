@@ -9,7 +9,7 @@ import pytest
 import xarray as xr
 
 from paraflex.dynamics import build_system, consistent_state, static_equilibrium
-from paraflex.files import ExpressionLaw
+from paraflex.files import ExpressionProfile
 from paraflex.mechanism import (
     Assembly,
     FlexibleBeam,
@@ -53,7 +53,7 @@ def quick_return() -> Mechanism:
             SlidingJoint("slot", REF("lever.Q"), REF("crank.A")),
             PrismaticJoint("rail", REF("ground.R"), REF("ram.C")),
         ),
-        prescribed=(PrescribedAngle("drive", "O", ExpressionLaw("0.4")),),
+        prescribed=(PrescribedAngle("drive", "O", ExpressionProfile("0.4")),),
         loads=(PointForce("cut", REF("ram.C"), (-200.0, 0.0)),),
         assemblies=(Assembly("start", {"crank": 0.4, "lever": 1.2, "link": 0.2, "ram": 0.0}),),
     )  # fmt: skip

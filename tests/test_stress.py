@@ -31,7 +31,7 @@ from paraflex.mechanism import (
     RevoluteJoint,
     Section,
     SlotJoint,
-    TabulatedLaw,
+    TabulatedProfile,
     WeldJoint,
 )
 from paraflex.motion import simulate_motion
@@ -194,7 +194,7 @@ def test_a_pendulum_bends_as_a_falling_chimney_does_and_hangs_on_its_pin(swingin
 SOON = 0.15
 _KNOTS = np.linspace(0.0, SOON, 13)
 # A torque that begins, turns round and ends smoothly: 6 N m one way, 1.6 N m the other.
-SMOOTH = TabulatedLaw(tuple(_KNOTS), tuple(10.0 * np.sin(np.pi * _KNOTS / SOON) ** 2 * (1.0 - 1.3 * _KNOTS / SOON)))
+SMOOTH = TabulatedProfile(tuple(_KNOTS), tuple(10.0 * np.sin(np.pi * _KNOTS / SOON) ** 2 * (1.0 - 1.3 * _KNOTS / SOON)))
 PLACES = (0.25 * L, 0.5 * L, 0.75 * L)
 CABLES = 32
 

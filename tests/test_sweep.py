@@ -416,10 +416,10 @@ def test_exporting_holds_one_group_at_a_time(tmp_path, monkeypatch):
 
 
 def test_designs():
-    from paraflex.designs.samples import Varied, designs
+    from paraflex.designs.samples import SweptParameter, designs
 
-    a = Varied("a", ("a",), low=1.0, high=100.0, log=True)
-    b = Varied("b", ("b",), low=2, high=5, whole=True)
+    a = SweptParameter("a", ("a",), low=1.0, high=100.0, log=True)
+    b = SweptParameter("b", ("b",), low=2, high=5, whole=True)
     for kind in ("random", "sobol"):
         many = designs([a, b], kind, 1000, seed=1)
         assert np.array_equal(many[:100], designs([a, b], kind, 100, seed=1))
@@ -428,18 +428,18 @@ def test_designs():
         assert np.mean(many[:, 0] < 10.0) == pytest.approx(0.5, abs=0.05)
         assert sorted(set(many[:, 1])) == [2, 3, 4, 5]
         assert np.bincount(many[:, 1].astype(int))[2:] == pytest.approx([250] * 4, abs=50)
-    grid = designs([Varied("a", ("a",), low=1.0, high=100.0, number=3, log=True), b_values()], "grid", None, 0)
+    grid = designs([SweptParameter("a", ("a",), low=1.0, high=100.0, number=3, log=True), b_values()], "grid", None, 0)
     assert np.allclose(grid, [[1, 7], [1, 8], [10, 7], [10, 8], [100, 7], [100, 8]])
     pairs = designs([b_values(), b_values()], "list", None, 0)
     assert pairs.tolist() == [[7, 7], [8, 8]]
     with pytest.raises(InputError, match="lists of different lengths"):
-        designs([b_values(), Varied("c", ("c",), values=(1.0,))], "list", None, 0)
+        designs([b_values(), SweptParameter("c", ("c",), values=(1.0,))], "list", None, 0)
 
 
 def b_values():
-    from paraflex.designs.samples import Varied
+    from paraflex.designs.samples import SweptParameter
 
-    return Varied("b", ("b",), values=(7.0, 8.0))
+    return SweptParameter("b", ("b",), values=(7.0, 8.0))
 
 
 def test_overlays_leave_the_data_as_they_are():

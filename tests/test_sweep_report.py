@@ -7,7 +7,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from paraflex.designs.reopen import open_study, run_again
+from paraflex.designs.reopen import open_study, rerun
 from paraflex.designs.units import unit_of
 from paraflex.errors import InputError
 from paraflex.figures.designs import DesignTable, failure_table, in_conflict, read_designs, undominated
@@ -322,7 +322,7 @@ def test_designs_with_other_stations_move_as_each_is_drawn(tmp_path):
     assert dict(result.counts) == {"complete": 3}
     study = open_study(tmp_path / "out")
     runs = [
-        run_again(study.setting, values, "square", "++")[0] for values in ((0.010, 2), (0.100, 3), (0.245, 4))
+        rerun(study.setting, values, "square", "++")[0] for values in ((0.010, 2), (0.100, 3), (0.245, 4))
     ]  # fmt: skip
     # What made the report leave designs out: stations are laid between the points of a beam.
     assert len({run.sizes["station"] for run in runs}) > 1

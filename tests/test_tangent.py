@@ -10,7 +10,7 @@ import pytest
 import twins
 from conftest import make_geared_linkage, make_linkage
 from paraflex.dynamics import build_system, constant_signals, inputs_of, pack_signals
-from paraflex.files import ExpressionLaw, load
+from paraflex.files import ExpressionProfile, load
 from paraflex.kernel.constraints import note_friction
 from paraflex.kernel.ode import (
     descriptor_jacobian,
@@ -42,8 +42,8 @@ def loaded_linkage(geometry):
             LinearSpring("stay", ref("ground.S"), ref("coupler.Q"), 70.0, 0.05, damping=1.0),
         ),
         loads=(
-            PointForce("pull", ref("coupler.R"), (3.0, ExpressionLaw("1 - 5 * t"))),
-            AppliedTorque("wring", ref("crank.P"), ExpressionLaw("0.7 * cos(t)")),
+            PointForce("pull", ref("coupler.R"), (3.0, ExpressionProfile("1 - 5 * t"))),
+            AppliedTorque("wring", ref("crank.P"), ExpressionProfile("0.7 * cos(t)")),
         ),
         gravity=(0.3, -9.81),
     )

@@ -14,7 +14,7 @@ from paraflex.files.dimensions import dimension_of, dimensions_of_parameters
 from paraflex.files.expressions import ExpressionError, evaluate
 from paraflex.files.fields import units_at
 from paraflex.files.schema import ModelTable
-from paraflex.units import FIELD_UNITS, UNITS, spelt, unit_named
+from paraflex.units import FIELD_UNITS, UNITS, dimension_text, unit_named
 
 # In SI units, by hand: with the float that a file would have in its place.
 KNOWN = {
@@ -44,10 +44,10 @@ def test_decimal_factors_are_rounded_once():
 def test_units_of_a_dimension_are_multiples_of_its_si_unit():
     for text, unit in {"g mm^2": "kg m^2", "N/mm": "N/m", "rpm": "rad/s", "psi": "Pa", "1/ms": "1/s"}.items():
         assert unit_named(text).dimension == unit_named(unit).dimension
-        assert spelt(unit_named(text).dimension) == ("Hz" if unit == "1/s" else unit)
+        assert dimension_text(unit_named(text).dimension) == ("Hz" if unit == "1/s" else unit)
     for unit in FIELD_UNITS:
         assert unit_named(unit).factor == 1
-    assert spelt((3, 1, 0, -1, 0)) == "kg m^3 rad^-1"
+    assert dimension_text((3, 1, 0, -1, 0)) == "kg m^3 rad^-1"
     assert UNITS["Nm"].dimension == unit_named("N m").dimension
     # An angle counts, so that frequencies are no speeds of rotation.
     assert unit_named("Hz").dimension != unit_named("rad/s").dimension
@@ -75,7 +75,7 @@ def test_units_in_expressions_stand_behind_numbers(text, value, unit):
     table = {"L": "300 mm", "m": 2.0}
     assert evaluate(text, {"L": 0.3, "m": 2.0}) == pytest.approx(value, rel=1e-15)
     dimension = dimension_of(text, dimensions_of_parameters(table))
-    assert (dimension if dimension is None else spelt(dimension)) == unit
+    assert (dimension if dimension is None else dimension_text(dimension)) == unit
 
 
 @pytest.mark.parametrize(
@@ -198,9 +198,11 @@ def with_table(folder, text, table):
 
 
 def columns_of(model):
-    """Times and values of the table of a model's law."""
-    members = [one.law for one in model.mechanism.prescribed] + [x for one in model.mechanism.loads for x in one.laws]
-    return [(law.times, law.values) for law in [*members, *model.study.torques.values()]]
+    """Times and values of the table of a model's profile."""
+    members = [one.profile for one in model.mechanism.prescribed] + [
+        x for one in model.mechanism.loads for x in one.profiles
+    ]
+    return [(profile.times, profile.values) for profile in [*members, *model.study.torques.values()]]
 
 
 @pytest.mark.parametrize(
@@ -282,7 +284,7 @@ def test_joints_that_slide_have_forces_and_lengths():
     }
 
 
-def test_laws_have_units():
+def test_profiles_have_units():
     text = """
 name = "rotor"
 ground = { O = [0.0, 0.0] }
@@ -298,7 +300,7 @@ joint = "O"
 angle = "30 deg * sin(2 * pi * 1 Hz * t)"
 """
     (drive,) = model_from(tomllib.loads(text), "rotor.toml").mechanism.prescribed
-    value, rate, _ = drive.law.evaluate(np.array([0.25, 0.5]))
+    value, rate, _ = drive.profile.evaluate(np.array([0.25, 0.5]))
     assert value == pytest.approx([math.radians(30), 0.0], abs=1e-15)
     assert rate == pytest.approx([0.0, -math.radians(30) * 2 * math.pi], abs=1e-12)
     with pytest.raises(pf.InputError, match=r"prescribed.drive.angle: a quantity in m where one in rad"):

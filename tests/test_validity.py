@@ -20,7 +20,7 @@ from paraflex.findings import Finding
 from paraflex.mechanism import Assembly, Geometry, Mechanism, PointForce, PointRef, WeldJoint
 from paraflex.motion import simulate_motion
 from paraflex.results import motion_dataset, motion_summary, summary, tracking_dataset
-from paraflex.results.doubts import doubt_lines
+from paraflex.results.findings import finding_lines
 from paraflex.results.validity import validity_line, validity_summary
 from paraflex.validity import FOURTH_ORDER_LIMIT, Following, Validity, assess, fourth_order
 from test_given_shapes import as_modal
@@ -274,7 +274,7 @@ def test_one_line_says_that_all_models_hold():
 def test_further_modes_with_the_same_doubt_share_a_line():
     one, other, third = (Finding("validity", place, "too far", "go back") for place in ("mode a", "mode b", "mode c"))
     gravity = Finding("gravity", "gravity", "odd", "look")
-    assert doubt_lines([one, gravity, other, third]) == [
+    assert finding_lines([one, gravity, other, third]) == [
         "warning: mode a: too far; go back [validity]",
         "warning: gravity: odd; look [gravity]",
         "warning: the same in mode b, c [validity]",

@@ -203,7 +203,7 @@ def _sides(joint):
 
 
 def constraints(system, t, q):
-    """Phi (m,) in the order of system.rows: p_b - p_a of a joint, angle_b - angle_a - law; of gears."""
+    """Phi (m,) in the order of system.rows: p_b - p_a of a joint, angle_b - angle_a - profile; of gears."""
     values = {}
     for joint in system.mechanism.joints:
         gap = np.zeros(2, dtype=np.result_type(q, float))
@@ -213,7 +213,7 @@ def constraints(system, t, q):
         values[f"{joint.name} x"], values[f"{joint.name} y"] = gap
     for prescribed in system.mechanism.prescribed:
         angle = joint_angle(system, prescribed.joint, q)
-        values[f"{prescribed.name} angle"] = angle - prescribed.law.evaluate(np.array([t]))[0][0]
+        values[f"{prescribed.name} angle"] = angle - prescribed.profile.evaluate(np.array([t]))[0][0]
     for gear in system.mechanism.gears:
         first, second = (joint_angle(system, joint, q) for joint in gear.joints)
         values[f"{gear.name} angle"] = second - gear.ratio * first - gear.phase

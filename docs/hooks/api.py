@@ -25,7 +25,7 @@ PACKAGES = (
     "motion",
     "validity",
     "elastodynamics",
-    "reduction",
+    "reduced_bodies",
     "linear",
     "control.loop.simulation",
     "control.loop.chain",

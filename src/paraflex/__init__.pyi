@@ -48,8 +48,8 @@ from .mechanism import (
     ModalDamping as ModalDamping,
     PrescribedAngle as PrescribedAngle,
     ConstantSpeed as ConstantSpeed,
-    PiecewiseLaw as PiecewiseLaw,
-    TabulatedLaw as TabulatedLaw,
+    PiecewiseProfile as PiecewiseProfile,
+    TabulatedProfile as TabulatedProfile,
     SampledAngle as SampledAngle,
 )
 
@@ -99,7 +99,7 @@ from .linear import (
     ReducedModel as ReducedModel,
     states_needed as states_needed,
 )
-from .reduction import reduced_mechanism as reduced_mechanism
+from .reduced_bodies import reduced_mechanism as reduced_mechanism
 
 # Statics
 from .equilibria import statics as statics, Statics as Statics

@@ -194,7 +194,7 @@ def _take_as(hint: Any, _spelling: str) -> Take | None:
     if origin in _TABLES or hint is dict:
         return _as_table(hint, inner)
     if origin is abc.Callable:
-        return _plain_of(callable, _noun(hint), f"give {_wanted(hint)}")
+        return _plain_of(callable, _noun(hint), f"give {_expected(hint)}")
     return _as_instance(hint) if isinstance(hint, type) and origin is None else None
 
 
@@ -260,10 +260,10 @@ def _as_instance(kind: type) -> Take | None:
     def take(value: Any, field: str) -> Any:
         if isinstance(value, kind):
             return value
-        made = None if make is None else make(value, field)
-        if made is not None:
-            return made
-        raise refused(value, field, _noun(kind), f"give {_wanted(kind)}")
+        converted = None if make is None else make(value, field)
+        if converted is not None:
+            return converted
+        raise refused(value, field, _noun(kind), f"give {_expected(kind)}")
 
     return take
 
@@ -294,7 +294,7 @@ def _as_one_of(hint: Any, kinds: Sequence[Any]) -> Take | None:
                 return each(value, field)  # type: ignore[misc]
             except InputError:
                 continue
-        raise refused(value, field, _noun(hint), f"give {_wanted(hint)}")
+        raise refused(value, field, _noun(hint), f"give {_expected(hint)}")
 
     return take
 
@@ -305,7 +305,7 @@ def _as_row(hint: Any, kinds: Sequence[Any]) -> Take:
 
     def take(value: Any, field: str) -> Any:
         if isinstance(value, str | Mapping) or not isinstance(value, Iterable) or _length(value) != len(takes):
-            raise refused(value, field, _noun(hint), f"give {_wanted(hint)}")
+            raise refused(value, field, _noun(hint), f"give {_expected(hint)}")
         return _same(value, tuple(each(one, field) if each else one for each, one in zip(takes, value, strict=True)))
 
     return take
@@ -330,11 +330,11 @@ def numbers_in(value: Any, field: str, kinds: Collection[str] = _REAL) -> Any:
     """
     if not isinstance(value, str | bytes | Mapping):
         try:
-            made = np.asarray(value)
+            converted = np.asarray(value)
         except ValueError:
-            made = np.empty(0, dtype=object)
-        if made.dtype.kind in kinds:
-            return made
+            converted = np.empty(0, dtype=object)
+        if converted.dtype.kind in kinds:
+            return converted
     raise refused(value, field, "an array of numbers", "give an array of numbers")
 
 
@@ -347,7 +347,7 @@ def _as_many(hint: Any, kind: Any, collect: Callable[[Iterable[Any]], Any]) -> T
         alone = (is_dataclass(value) and not isinstance(value, Sequence)) or getattr(value, "ndim", 1) == 0
         if isinstance(value, str | Mapping) or alone or not isinstance(value, Iterable):
             if value is None or one is None:
-                raise refused(value, field, _noun(hint), f"give {_wanted(hint)}")
+                raise refused(value, field, _noun(hint), f"give {_expected(hint)}")
             return collect([one(value, field)])
         if one is None or (numbers and kind is float and getattr(value, "ndim", 1) == 1):
             return value
@@ -366,16 +366,16 @@ def _as_table(hint: Any, kinds: Sequence[Any]) -> Take:
 
     def take(value: Any, field: str) -> Any:
         if not isinstance(value, Mapping):
-            raise refused(value, field, _noun(hint), f"give {_wanted(hint)}")
+            raise refused(value, field, _noun(hint), f"give {_expected(hint)}")
         if key is None and item is None:
             return value
         names, items = list(value.keys()), list(value.values())
-        made_names = [key(name, field) for name in names] if key else names
-        made = [item(each, f"{field}.{name}") for name, each in zip(names, items, strict=True)] if item else items
+        converted_names = [key(name, field) for name in names] if key else names
+        converted = [item(each, f"{field}.{name}") for name, each in zip(names, items, strict=True)] if item else items
         return (
             value
-            if _same(names, made_names) is names and _same(items, made) is items
-            else dict(zip(made_names, made, strict=True))
+            if _same(names, converted_names) is names and _same(items, converted) is items
+            else dict(zip(converted_names, converted, strict=True))
         )
 
     return take
@@ -385,22 +385,26 @@ def _length(value: Any) -> int:
     return len(value) if hasattr(value, "__len__") else -1
 
 
-def _same(given: Any, made: Any) -> Any:
+def _same(given: Any, converted: Any) -> Any:
     """Return the given collection if it has the type and the very entries of the converted one, else the latter."""
-    return given if type(given) is type(made) and all(a is b for a, b in zip(given, made, strict=True)) else made
+    return (
+        given
+        if type(given) is type(converted) and all(a is b for a, b in zip(given, converted, strict=True))
+        else converted
+    )
 
 
 _NOUNS = {float: "a number", int: "a whole number", str: "a text", bool: "True or False"}
 _NUMBER_WORDS = {2: "two", 3: "three"}
 # Noun of a class in errors, and the value to give instead.
-_GIVEN_AS: dict[Any, tuple[str, str]] = {}
+_ERROR_NOUNS: dict[Any, tuple[str, str]] = {}
 
 
-def given_as(noun: str, wanted: str = "") -> Callable[[C], C]:
+def named_in_errors(noun: str, expected: str = "") -> Callable[[C], C]:
     """Return a class decorator that registers the noun of the class in errors, and the value to give instead."""
 
     def register(kind: C) -> C:
-        _GIVEN_AS[kind] = noun, wanted
+        _ERROR_NOUNS[kind] = noun, expected
         return kind
 
     return register
@@ -410,8 +414,8 @@ def _noun(hint: Any) -> str:
     """Return the noun of a type in error messages."""
     if hint in _NOUNS:
         return _NOUNS[hint]
-    if _stripped(hint) in _GIVEN_AS:
-        return _GIVEN_AS[_stripped(hint)][0]
+    if _stripped(hint) in _ERROR_NOUNS:
+        return _ERROR_NOUNS[_stripped(hint)][0]
     origin, inner = typing.get_origin(hint), typing.get_args(hint)
     if origin in _UNIONS:
         return _either([_noun(kind) for kind in _members(inner)])
@@ -428,16 +432,16 @@ def _noun(hint: Any) -> str:
     return f"{'an' if hint.__name__[0] in 'AEIOU' else 'a'} {hint.__name__}"
 
 
-def _wanted(hint: Any) -> str:
+def _expected(hint: Any) -> str:
     """Return the description of the value to give instead."""
     origin, inner = typing.get_origin(hint), typing.get_args(hint)
-    wanted = _GIVEN_AS.get(_stripped(hint), ("", ""))[1]
-    if wanted:
-        return wanted
+    expected = _ERROR_NOUNS.get(_stripped(hint), ("", ""))[1]
+    if expected:
+        return expected
     if origin in _UNIONS:
-        return _either([_wanted(kind) for kind in _members(inner)])
+        return _either([_expected(kind) for kind in _members(inner)])
     if origin in _LISTS and not _is_row(hint):
-        return f"a list, each {_wanted(inner[0])}"
+        return f"a list, each {_expected(inner[0])}"
     if origin in _TABLES and inner and Any not in inner:
         return f"a dictionary, {{{_noun(inner[0]).replace('a text', 'name')}: {_noun(inner[1])}}}"
     if isinstance(hint, type) and issubclass(hint, Enum):

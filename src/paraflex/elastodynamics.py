@@ -148,7 +148,7 @@ def simulate_ked(
 
 def _check(task: TrackingTask, step: float) -> None:
     mechanism = task.mechanism
-    beyond = {(group.table, group.words): members for group, members in grouped(with_actuators(mechanism))
+    beyond = {(group.table, group.plural_noun): members for group, members in grouped(with_actuators(mechanism))
               if group.resists}  # fmt: skip
     beyond["damped beam", "damped beams"] = tuple(
         body for body in mechanism.bodies if getattr(body, "damping", None) is not None

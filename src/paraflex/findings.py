@@ -107,7 +107,7 @@ _DOUBTFUL = {
     "equilibrium-unstable": "A static equilibrium is unstable: the mechanism would move away from it.",
     "motions-grow": "Some motions about the pose grow instead of vibrating.",
     "axis-along-beam": "A slot or prismatic joint has its straight axis along a flexible beam.",
-    "elements-few": "Elements of a beam are too long for a joint that slides along it, or for fast loads or laws.",
+    "elements-few": "Elements of a beam are too long for a joint that slides along it, or for fast loads or profiles.",
     "slider-off-beam": "A sliding joint leaves its beam.",
     "frequency-low": "The natural frequency of a link is implausibly low.",
     "torque-large": "Torques or forces are far beyond what mass, size and speed make plausible.",

@@ -65,7 +65,7 @@ class Calls:
     def __init__(self) -> None:
         self._done: SimpleQueue[Future[Any]] = SimpleQueue()
 
-    def hand(self, submit: Callable[..., Future[Any]], *arguments: Any) -> Future[Any]:
+    def submit(self, submit: Callable[..., Future[Any]], *arguments: Any) -> Future[Any]:
         """Submit a call with signals deferred, and return the future that `submit` returns."""
         with uninterrupted():
             future = submit(*arguments)

@@ -10,7 +10,7 @@ from typing import ClassVar
 import numpy as np
 
 from paraflex.actuation import Electrical, electrical, electrical_findings
-from paraflex.arguments import checked_arguments, given_as
+from paraflex.arguments import checked_arguments, named_in_errors
 from paraflex.arrays import Array
 from paraflex.display import Shown
 from paraflex.dynamics import (
@@ -21,8 +21,8 @@ from paraflex.dynamics import (
     consistent_state,
     constant_signals,
     dependence,
-    law_signal,
     pack_signals,
+    profile_signal,
     standing_system,
     start_state,
 )
@@ -31,10 +31,10 @@ from paraflex.findings import Finding, warn_of
 from paraflex.integrators import IntegrationOptions, Method, Solution, check_times, choose, integrate
 from paraflex.kernel.packed import Signals
 from paraflex.kinematics import ModelWithPaths
-from paraflex.mechanism import AngleLaw, Mechanism, Start
+from paraflex.mechanism import Mechanism, Start, TimeProfile
 from paraflex.mechanism.loads import InTime
 from paraflex.mechanism.quantities import known
-from paraflex.validity import Validity, assess, doubtful_results, moved_far, warn, with_blame
+from paraflex.validity import Validity, assess, implausible_results, large_rotations, warn, with_likely_cause
 
 # Remedy for a balanced start that is not found.
 UNBALANCED = "make links and springs stiff enough for weight and loads, or leave it out"
@@ -44,7 +44,7 @@ UNBALANCED = "make links and springs stiff enough for weight and loads, or leave
 _COARSER, _GROWN, _SMALL = 100.0, 1e-3, 0.01
 
 
-@given_as("a run without a path", "the run that simulate_motion returns")
+@named_in_errors("a run without a path", "the run that simulate_motion returns")
 @dataclass(frozen=True)
 class MotionRun(Shown):
     """Run of a mechanism without a path.
@@ -55,7 +55,7 @@ class MotionRun(Shown):
         Equations of motion of the mechanism.
     times : (k,) array
         Times at which results are kept [s]; if an event ends the run, those until then and that of the event.
-    torques : mapping of str to float or AngleLaw
+    torques : mapping of str to float or TimeProfile
         Torque of each motor, constant or a function of time [N m].
     solution : Solution
         Computed motion.
@@ -71,14 +71,15 @@ class MotionRun(Shown):
     @property
     def in_time(self) -> bool:
         """Whether torques change in time."""
-        return any(isinstance(law, AngleLaw) for law in self.torques.values())
+        return any(isinstance(profile, TimeProfile) for profile in self.torques.values())
 
     @property
     def applied(self) -> Array:
         """Torques (k, motors) at the times of the solution [N m]."""
         t = self.solution.t
         each = [
-            law.evaluate(t)[0] if isinstance(law, AngleLaw) else np.full(t.size, law) for law in self.torques.values()
+            profile.evaluate(t)[0] if isinstance(profile, TimeProfile) else np.full(t.size, profile)
+            for profile in self.torques.values()
         ]
         return np.stack(each, axis=1) if each else np.zeros((t.size, 0))
 
@@ -93,9 +94,9 @@ class MotionRun(Shown):
         return electrical(self.system, self.system.described, self)
 
     @cached_property
-    def doubts(self) -> tuple[Finding, ...]:
+    def findings(self) -> tuple[Finding, ...]:
         """Findings on events in the run, on implausible results and on limits of amplifiers."""
-        results = doubtful_results(self.system, self.solution)
+        results = implausible_results(self.system, self.solution)
         described = self.system.described
         amplifiers = electrical_findings(described, self.electrical) if described.actuators else ()
         grown = _grown_errors(self) if self.open_loop else ()
@@ -126,7 +127,7 @@ def simulate_motion(
         Duration of the run [s]; that of the model's study by default.
     samples : int
         Number of sample times at which results are kept, evenly spaced, both ends included.
-    torques : mapping of str to float or AngleLaw, optional
+    torques : mapping of str to float or TimeProfile, optional
         Torques by motor [N m], constant or functions of time, which may jump; zero for the others. Those of the model's
         study by default.
     start : State, Start or str, optional
@@ -143,7 +144,7 @@ def simulate_motion(
     on_progress : callable, optional
         Function called with the time reached [s].
     warning : bool
-        Whether a doubtful run issues warnings; its `validity` and `doubts` contain the findings in any case.
+        Whether a doubtful run issues warnings; its `validity` and `findings` contain the findings in any case.
 
     Returns
     -------
@@ -153,7 +154,7 @@ def simulate_motion(
     Warns
     -----
     ValidityWarning, ResultWarning
-        The run is outside the validity of its model, or its results are implausible; `validity` and `doubts` give the
+        The run is outside the validity of its model, or its results are implausible; `validity` and `findings` give the
         reasons.
 
     Raises
@@ -166,14 +167,14 @@ def simulate_motion(
     IntegrationError
         The run could not be finished; the error carries a MotionRun with the results so far.
     """
-    given, mechanism = mechanism, Mechanism.made_of(mechanism)
+    given, mechanism = mechanism, Mechanism.from_source(mechanism)
     options = choose(method, options)
     names = [motor.name for motor in mechanism.motors]
     if torques is None:
         torques = dict(getattr(getattr(given, "study", None), "torques", {}))
     for name, torque in torques.items():
         known(name, names, "torques", "motor")
-        if not isinstance(torque, AngleLaw) and not np.isfinite(torque):
+        if not isinstance(torque, TimeProfile) and not np.isfinite(torque):
             raise InputError("not a finite number", field=f"torques.{name}", value=torque, remedy="give it in N m")
     values = {name: torques.get(name, 0.0) for name in names}
     system, state, times = motion_start(given, duration, samples, start, balanced=balanced, warning=warning)
@@ -183,12 +184,12 @@ def simulate_motion(
             system, signals, state, times, knots=knots, options=options, samples=samples, on_progress=on_progress
         )
     except IntegrationError as error:
-        error.partial = _run(system, times, values, with_blame(error, mechanism).partial)
+        error.partial = _run(system, times, values, with_likely_cause(error, mechanism).partial)
         raise
     run = _run(system, times, values, solution)
     if warning:
         warn(run.validity)
-        warn_of(run.doubts, ResultWarning)
+        warn_of(run.findings, ResultWarning)
     return run
 
 
@@ -219,7 +220,7 @@ def motion_start(
         raise InputError(
             "a given state cannot be balanced", field="balanced", value=balanced, remedy="leave one of the two out"
         )
-    system = standing_system(Mechanism.made_of(given), start)
+    system = standing_system(Mechanism.from_source(given), start)
     if isinstance(start, State):
         state = start
     else:
@@ -228,7 +229,7 @@ def motion_start(
     placed = isinstance(start, State) or (isinstance(start, Start) and start.places)
     if warning and not placed and system.mechanism.assemblies:
         assembly = system.mechanism.assembly(start if isinstance(start, str) else None)
-        warn_of(moved_far(system, assembly, state.q), ResultWarning)
+        warn_of(large_rotations(system, assembly, state.q), ResultWarning)
     return system, state, np.linspace(state.time, state.time + duration, samples)
 
 
@@ -239,12 +240,12 @@ def _run(system: System, times: Array, torques: Mapping[str, InTime], solution: 
 def _signals(system: System, torques: Mapping[str, InTime], end: float) -> tuple[Signals, Array]:
     """Return torques and prescribed motions as signals, and the times between which they are smooth [s]."""
     motors, own = [], []
-    for name, law in torques.items():
-        if isinstance(law, AngleLaw):
-            signal, inner = law_signal(f"torques.{name}", law, end)
+    for name, profile in torques.items():
+        if isinstance(profile, TimeProfile):
+            signal, inner = profile_signal(f"torques.{name}", profile, end)
             own += inner
         else:
-            (signal,) = constant_signals([float(law)], end)
+            (signal,) = constant_signals([float(profile)], end)
         motors.append(signal)
     signals, knots = pack_signals(system.mechanism, motors, end)
     return signals, np.array([*own, *knots])

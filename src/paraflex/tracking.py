@@ -20,7 +20,7 @@ from paraflex.actuation import (
     plan_torques,
     required_effort,
 )
-from paraflex.arguments import checked_arguments, given_as
+from paraflex.arguments import checked_arguments, named_in_errors
 from paraflex.arrays import Array
 from paraflex.display import Shown
 from paraflex.dynamics import (
@@ -42,8 +42,8 @@ from paraflex.integrators.beam_ends import leave_beam
 from paraflex.integrators.between import SAMPLES
 from paraflex.kinematics import ModelWithPaths, Path, RigidMotion, path_follower
 from paraflex.mechanism import ActuationMode, Mechanism, finite_segments, parse_mode, standing
-from paraflex.mechanism.laws import stops
-from paraflex.validity import Driven, Following, Validity, assess, doubtful_results, warn, with_blame
+from paraflex.mechanism.profiles import stops
+from paraflex.validity import Driven, Following, Validity, assess, implausible_results, warn, with_likely_cause
 
 # Times closer than this fraction of the run are merged: a knot beside a sample would force a step of almost zero
 # length.
@@ -64,7 +64,7 @@ class Ending(Enum):
     HOLD = "hold"
 
 
-@given_as("a task", "the task that plan_tracking makes")
+@named_in_errors("a task", "the task that plan_tracking makes")
 @dataclass(frozen=True)
 class TrackingTask:
     """Mechanism, path, and rigid motion along it: the common part of the runs of all modes.
@@ -136,11 +136,11 @@ class TrackingTask:
         """
         mechanism, desired = self.mechanism, self.motion.desired
         names = [motor.name for motor in mechanism.motors]
-        wanted = desired.position if actual is None else desired.position[: len(actual)]
+        desired_position = desired.position if actual is None else desired.position[: len(actual)]
         return Driven(
             mode=mode,
-            desired=wanted,
-            actual=wanted if actual is None else actual,
+            desired=desired_position,
+            actual=desired_position if actual is None else actual,
             acceleration=float(np.max(np.linalg.norm(desired.acceleration, axis=1))),
             peaks=dict(zip(names, np.max(np.abs(torques), axis=0).tolist(), strict=True)),
             units=dict(zip(names, mechanism.motor_units(), strict=True)),
@@ -208,7 +208,7 @@ class TrackingTask:
         return simulate(self, mode, method=method, options=options, after=after, warning=warning)
 
 
-@given_as("a run along a path", "a run that simulate returns")
+@named_in_errors("a run along a path", "a run that simulate returns")
 @dataclass(frozen=True)
 class TrackingRun(Shown):
     """Run of one mode of a task.
@@ -258,10 +258,10 @@ class TrackingRun(Shown):
         return assess(self.task.system, self.solution, following)
 
     @cached_property
-    def doubts(self) -> tuple[Finding, ...]:
+    def findings(self) -> tuple[Finding, ...]:
         """Findings on events in the run, and on results that are implausible for the mechanism."""
         whole = self.task.whole or self.task
-        found = doubtful_results(self.task.system, self.solution, self.driven, whole.mechanism)
+        found = implausible_results(self.task.system, self.solution, self.driven, whole.mechanism)
         # The sufficient number of samples differs from mode to mode.
         of_run = (
             replace(one, place=f"mode {self.mode.name}") if one.place == SAMPLES else one
@@ -291,7 +291,7 @@ class TrackingRun(Shown):
     def warn(self) -> None:
         """Issue a `ValidityWarning` or a `ResultWarning` for each finding."""
         warn(self.validity, f"mode {self.mode.name}")
-        warn_of(self.doubts, ResultWarning)
+        warn_of(self.findings, ResultWarning)
 
 
 @checked_arguments()
@@ -393,7 +393,7 @@ def simulate(
         Function called with the time reached [s].
     warning : bool
         Whether a run outside the validity of its model issues a `ValidityWarning`, and one with implausible results a
-        `ResultWarning`; its `validity` and `doubts` contain the findings in any case.
+        `ResultWarning`; its `validity` and `findings` contain the findings in any case.
 
     Returns
     -------
@@ -430,7 +430,7 @@ def simulate(
 
 def _planned(given: Mechanism | ModelWithPaths, path: Path | str) -> tuple[Mechanism, Path]:
     """Return the mechanism and the path, which may be given by its name in a model."""
-    mechanism = Mechanism.made_of(given)
+    mechanism = Mechanism.from_source(given)
     if not isinstance(path, str):
         return mechanism, path
     if isinstance(given, Mechanism):
@@ -456,7 +456,7 @@ def _drive(
             on_progress=on_progress,
         )  # fmt: skip
     except IntegrationError as error:
-        with_blame(error, (task.whole or task).mechanism)
+        with_likely_cause(error, (task.whole or task).mechanism)
         raise
 
 
@@ -497,7 +497,7 @@ def _drive_and_hold(
             begun=driven, samples=times.size, on_progress=on_progress,
         )  # fmt: skip
     except IntegrationError as error:
-        error.partial = whole(with_blame(error, (task.whole or task).mechanism).partial)
+        error.partial = whole(with_likely_cause(error, (task.whole or task).mechanism).partial)
         raise
     return whole(held)
 
@@ -520,9 +520,9 @@ def path_knots(path: Path, end: float, mechanism: Mechanism | None = None) -> Ar
     """
     knots = np.unique(np.concatenate([[0.0, end], [knot for knot in path.knots if 0.0 < knot < end]]))
     knots = knots[np.concatenate([[True], np.diff(knots) > _SAME_TIME * end])]
-    laws = [law for load in mechanism.loads for law in load.laws] if mechanism else []
+    profiles = [profile for load in mechanism.loads for profile in load.profiles] if mechanism else []
     given = np.unique(
-        [knot for law in laws for knot in law.knots if _SAME_TIME * end < knot < end * (1.0 - _SAME_TIME)]
+        [knot for profile in profiles for knot in profile.knots if _SAME_TIME * end < knot < end * (1.0 - _SAME_TIME)]
     )
     # Where two knots coincide, that of the load is kept, as steps end there.
     apart = np.abs(knots[:, None] - given) > _SAME_TIME * end
@@ -531,5 +531,5 @@ def path_knots(path: Path, end: float, mechanism: Mechanism | None = None) -> Ar
 
 def path_stops(knots: Array, mechanism: Mechanism) -> Array:
     """Return the knots of planned torques at which steps must end, omitting most rows of long load tables."""
-    laws = [law for load in mechanism.loads for law in load.laws]
-    return knots[~np.isin(knots, [knot for law in laws for knot in set(law.knots) - set(stops(law))])]
+    profiles = [profile for load in mechanism.loads for profile in load.profiles]
+    return knots[~np.isin(knots, [knot for profile in profiles for knot in set(profile.knots) - set(stops(profile))])]

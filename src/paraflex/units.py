@@ -189,7 +189,7 @@ WHERE_IT_SLIDES = {
 }  # fmt: skip
 
 
-def spelt(dimension: Dimension) -> str:
+def dimension_text(dimension: Dimension) -> str:
     """Return the SI unit of a dimension, as the fields of files spell it where they have it."""
     for unit in FIELD_UNITS:
         if unit_named(unit).dimension == dimension:

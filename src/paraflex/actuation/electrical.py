@@ -139,7 +139,7 @@ def electrical_findings(
             )  # fmt: skip
         if actuator is not None and found.t.size:
             yield from _beyond(actuator, motor, found.current[:, k], found.voltage[:, k])
-            yield from _late(actuator, motor, found, k)
+            yield from _delayed_back_emf(actuator, motor, found, k)
 
 
 def _beyond(actuator: Actuator, motor: str, current: Array, voltage: Array) -> Iterator[Finding]:
@@ -155,7 +155,7 @@ def _beyond(actuator: Actuator, motor: str, current: Array, voltage: Array) -> I
             )  # fmt: skip
 
 
-def _late(actuator: Actuator, motor: str, found: Electrical, k: int) -> Iterator[Finding]:
+def _delayed_back_emf(actuator: Actuator, motor: str, found: Electrical, k: int) -> Iterator[Finding]:
     """Yield a finding if the delay of back-EMF by L/R matters, as the model's back-EMF damps without delay."""
     if not (actuator.imposes_voltage and actuator.inductance) or found.t.size < 3:
         return

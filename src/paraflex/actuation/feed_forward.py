@@ -191,7 +191,7 @@ def plan_torques(follow: Callable[[Array], RigidMotion], knots: Array) -> Torque
 
 def _before(motion: RigidMotion, knots: Array) -> Effort | None:
     """Return the effort just before each knot of a motion whose loads change in time; else None."""
-    if not any(load.laws for load in motion.mechanism.loads):
+    if not any(load.profiles for load in motion.mechanism.loads):
         return None
     at = np.searchsorted(motion.t, knots)
     return required_effort(replace(motion, **{name: getattr(motion, name)[at] for name in _IN_TIME}), before=True)

@@ -94,8 +94,8 @@ def open_campaign(
         for left in [*folder.glob("*.part"), *folder.glob(f"{TRAJECTORIES}/*.part")]:
             check_inside(folder, left.relative_to(folder))
             left.unlink(missing_ok=True)
-        said = read_study(folder / STUDY) if (folder / STUDY).exists() else study
-        _check_same(folder, said, study)
+        stored = read_study(folder / STUDY) if (folder / STUDY).exists() else study
+        _check_same(folder, stored, study)
         with write_journal(folder, locks=held.locks) as journal:
             noted = journal.noted("study")
             _check_same(folder, study if noted is None else _noted(noted), study)
@@ -105,7 +105,7 @@ def open_campaign(
             if journal.noted(SCHEMA_KEY) is None:
                 journal.note(SCHEMA_KEY, schema.serialize().to_pybytes())
             if not (folder / STUDY).exists():
-                with held.amended() as new:
+                with held.added_files() as new:
                     write_json(new / STUDY, study, remedy=GO_ON)
             yield Campaign(held, journal)
 
@@ -146,11 +146,11 @@ def _check_same(folder: Path, found: Any, study: Mapping[str, Any]) -> None:
     if not isinstance(had_versions, Mapping) or found.get("content") != study["content"]:
         problem = "the folder holds results of another study, or of this one before it was changed"
         raise InputError(problem, field="--output", value=str(folder), remedy="name a new folder")
-    for name, wanted in study["versions"].items():
+    for name, version in study["versions"].items():
         had = had_versions.get(name)
-        if had != wanted:
+        if had != version:
             raise InputError(
-                f"the folder's results were begun with {name} {had}, this is {wanted}: they would not be comparable",
+                f"the folder's results were begun with {name} {had}, this is {version}: they would not be comparable",
                 field="--output", value=str(folder), remedy=f"name a new folder, or install {name} {had}",
             )  # fmt: skip
 

@@ -52,7 +52,7 @@ _UNWRITABLE = {
     sqlite3.SQLITE_BUSY, sqlite3.SQLITE_CANTOPEN, sqlite3.SQLITE_FULL, sqlite3.SQLITE_IOERR, sqlite3.SQLITE_LOCKED,
     sqlite3.SQLITE_PERM, sqlite3.SQLITE_PROTOCOL, sqlite3.SQLITE_READONLY,
 }  # fmt: skip
-_MEND = "run the same command again: what is whole is kept, and the other runs are made again"
+_REPAIR_REMEDY = "run the same command again: what is whole is kept, and the other runs are made again"
 
 Row = dict[str, Any]
 
@@ -189,9 +189,9 @@ def write_journal(folder: Path, *, locks: bool = True) -> Iterator[Journal]:
     if file.is_file() and not file.is_symlink() and file.stat().st_nlink > 1:
         with whole_file(file, remedy=GO_ON) as own:
             shutil.copyfile(file, own)
-    reason = _reason_to_mend(file, how)
+    reason = _reason_to_repair(file, how)
     if reason:
-        _mend(file, how, reason)
+        _repair(file, how, reason)
     with _errors(file), _connected(file, how) as connection:
         journal = Journal(connection)
         try:
@@ -216,7 +216,7 @@ def read_journal(file: Path) -> Iterator[Journal]:
         yield Journal(connection)
 
 
-def _reason_to_mend(file: Path, how: str) -> str:
+def _reason_to_repair(file: Path, how: str) -> str:
     """Return the reason why a journal is damaged; empty if it is intact or does not exist."""
     if not file.exists():
         return ""
@@ -233,7 +233,7 @@ def _reason_to_mend(file: Path, how: str) -> str:
     return "" if start in (b"", _HEAD) else "its first bytes are not as they were written"
 
 
-def _mend(file: Path, how: str, reason: str) -> None:
+def _repair(file: Path, how: str, reason: str) -> None:
     """Rewrite a damaged journal from its intact rows and notes.
 
     Raises
@@ -247,7 +247,7 @@ def _mend(file: Path, how: str, reason: str) -> None:
             with _connected(unfinished, how) as connection:
                 shutil.copyfile(file, copy)
                 _restore_first_page(copy, unfinished.read_bytes())
-                kept = _keep_whole(copy, Journal(connection))
+                kept = _keep_intact(copy, Journal(connection))
             if not kept:
                 raise _damaged(file, reason)
             # The rollback journal refers to pages of the damaged file.
@@ -265,7 +265,7 @@ def _restore_first_page(file: Path, empty: bytes) -> None:
         stream.write(empty[:28] + pages.to_bytes(4, "big") + bytes(8) + empty[40:_PAGE])
 
 
-def _keep_whole(damaged: Path, journal: Journal) -> int:
+def _keep_intact(damaged: Path, journal: Journal) -> int:
     """Copy the intact notes and rows of a damaged file to a journal, and return the number of rows."""
     found: set[tuple[int, str]] = set()
     with suppress(sqlite3.DatabaseError), _connected(damaged, "mode=rw") as connection:
@@ -328,7 +328,7 @@ def _errors(file: Path) -> Iterator[None]:
             remedy = "run the same command again: its runs are made again"
             raise OutputError("was deleted while it was written", field=str(file), remedy=remedy) from error
         if _code(error) not in _UNWRITABLE:
-            raise _damaged(file, str(error), _MEND) from error
+            raise _damaged(file, str(error), _REPAIR_REMEDY) from error
         reason = "no space left on device" if _code(error) == sqlite3.SQLITE_FULL else str(error)
         raise OutputError(f"cannot be written ({reason})", field=str(file), remedy=GO_ON) from error
 

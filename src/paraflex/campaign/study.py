@@ -174,7 +174,7 @@ class KeptResult(Result):
         OutputError
             Files that cannot be written.
         """
-        with hold_folder(self.folder, self.kept_as, remedy=GO_ON) as held, held.amended() as new:
+        with hold_folder(self.folder, self.kept_as, remedy=GO_ON) as held, held.added_files() as new:
             yield new
 
     def write_files(self, folder: Path) -> None:
@@ -239,7 +239,7 @@ class WholeStudy(Study[R_co]):
         on_progress: OnProgress | None = None,
     ) -> R_co:
         """Run the study, and write the results into the folder, if one is given; see `Study.run`."""
-        do = self._ready(workers)
+        do = self._prepare(workers)
         with nullcontext() if folder is None else hold_folder(Path(folder), self.gives.kept_as) as held:
             result = do(on_progress)
             if held is not None and result.begun:
@@ -247,7 +247,7 @@ class WholeStudy(Study[R_co]):
         return result
 
     @abstractmethod
-    def _ready(self, workers: Workers | None) -> Callable[[OnProgress | None], R_co]:
+    def _prepare(self, workers: Workers | None) -> Callable[[OnProgress | None], R_co]:
         """Check everything that needs no run, and return the function that runs the study."""
 
 

@@ -202,11 +202,11 @@ class Dask(Engine):
         if abandon and self._cluster is not None:
             # Closing the cluster re-enables its logs while connections are still being broken off.
             logging.getLogger("distributed").setLevel(logging.CRITICAL)
-            threading.Thread(target=self._let_go, args=[True], daemon=True).start()
+            threading.Thread(target=self._release, args=[True], daemon=True).start()
         else:
-            self._let_go(abandon)
+            self._release(abandon)
 
-    def _let_go(self, abandon: bool) -> None:
+    def _release(self, abandon: bool) -> None:
         self._pool.shutdown(wait=not abandon)
         self._client.close(timeout=5)
         if self._cluster is not None:
@@ -285,7 +285,7 @@ def outcomes(engine: Engine, function: Callable[..., R], tasks: Iterable[T]) -> 
     waiting, running, calls = iter(tasks), {}, Calls()
     while True:
         more = islice(waiting, max(0, _AHEAD * engine.workers - len(running)))
-        running |= {calls.hand(_submit, engine, function, task): task for task in more}
+        running |= {calls.submit(_submit, engine, function, task): task for task in more}
         if not running:
             return
         done = calls.done()
@@ -317,7 +317,7 @@ def _one_by_one(engine: Engine, function: Callable[..., R], tasks: list[T]) -> I
     for task in tasks:
         result: R | LostWorker = LostWorker(f"{_DEATHS + 1} workers died running it: out of memory, or killed")
         for _ in range(_DEATHS):
-            future = calls.hand(_submit, engine, function, task)
+            future = calls.submit(_submit, engine, function, task)
             while future not in calls.done():
                 pass
             try:

@@ -19,7 +19,7 @@ from paraflex.integrators import loose_tolerance
 from paraflex.mechanism import ActuationMode, Mechanism, Start
 from paraflex.tracking import TrackingTask
 from paraflex.units import without_quantities
-from paraflex.validity.numbers import FAST, doubtful_numbers, mechanism_size
+from paraflex.validity.numbers import FAST, implausible_numbers, mechanism_size
 
 _NAME = re.compile(r"[^\W\d]\w*")
 
@@ -73,7 +73,7 @@ def check(
     seen = seen or examine(mechanism, assembly)
     at_rest = not isinstance(model, Model) or model.start is None
     duration = model.study.duration if isinstance(model, Model) else None
-    found: list[Finding] = [*doubtful_numbers(mechanism, duration), *pose_findings(seen, at_rest=at_rest)]
+    found: list[Finding] = [*implausible_numbers(mechanism, duration), *pose_findings(seen, at_rest=at_rest)]
     if isinstance(model, Model):
         refused = list(start_findings(model, seen, assembly))
         if model.start is not None and seen.chosen is not None and seen.chosen.undecided and not refused:
@@ -97,7 +97,7 @@ def check_planned(
     Modes that cannot drive the mechanism are reported by the run.
     """
     seen = examine(model.mechanism, assembly or model.study.assembly)
-    found = [*doubtful_numbers(model.mechanism), *pose_findings(seen), *task_findings(task, modes)]
+    found = [*implausible_numbers(model.mechanism), *pose_findings(seen), *task_findings(task, modes)]
     found += file_findings(model)
     found += path_findings(model, task.path, path, float(task.motion.t[-1]))
     return Verdict(one for one in found if one.code not in ("path-singular", "mode-short"))

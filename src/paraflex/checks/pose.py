@@ -13,15 +13,15 @@ import numpy as np
 from paraflex.arrays import Array
 from paraflex.dynamics import (
     Closure,
+    DrivenFreedoms,
     Mobility,
-    Reach,
     System,
     build_system,
     closure_of,
+    driven_freedoms,
     joint_coordinate,
     mobility,
     natural_frequencies,
-    reach,
     standing_system,
     undeformed,
 )
@@ -32,7 +32,7 @@ from paraflex.findings import Finding
 from paraflex.limits import OUT_OF_PROPORTION
 from paraflex.mechanism import FlexibleBeam, Mechanism, standing
 from paraflex.mechanism.joints import GROUND, PointRef
-from paraflex.validity import moved_far, stiff_modes
+from paraflex.validity import large_rotations, stiff_modes
 from paraflex.validity.actions import numbered_alike
 from paraflex.validity.numbers import mechanism_size
 
@@ -58,7 +58,7 @@ class Examination:
         Closure of the chosen assembly; None if there is no assembly.
     mobility : Mobility or None
         Degrees of freedom at the pose; None if the assembly does not close.
-    reach : Reach or None
+    reach : DrivenFreedoms or None
         Degrees of freedom driven by motors; None if the assembly does not close.
     problem : str
         Reason why mobility and reach of a closed assembly could not be computed; empty for none.
@@ -69,7 +69,7 @@ class Examination:
     starts: tuple[Closure, ...]
     chosen: Closure | None
     mobility: Mobility | None
-    reach: Reach | None
+    reach: DrivenFreedoms | None
     problem: str = ""
 
 
@@ -93,13 +93,13 @@ def examine(mechanism: Mechanism, assembly: str | None = None) -> Examination:
     starts = tuple(closure_of(standing_system(rigid.mechanism, one.name), one) for one in mechanism.assemblies)
     if not mechanism.assemblies:
         return Examination(system, rigid, starts, None, None, None)
-    wanted = mechanism.assembly(assembly)
-    chosen = next(start for start in starts if start.assembly == wanted.name)
+    requested = mechanism.assembly(assembly)
+    chosen = next(start for start in starts if start.assembly == requested.name)
     if chosen.state is None:
         return Examination(system, rigid, starts, chosen, None, None)
     try:
         free = mobility(rigid, chosen.state)
-        return Examination(system, rigid, starts, chosen, free, reach(rigid, chosen.state, free.freedoms))
+        return Examination(system, rigid, starts, chosen, free, driven_freedoms(rigid, chosen.state, free.freedoms))
     except ProportionError as error:
         return Examination(system, rigid, starts, chosen, None, None, str(error))
 
@@ -116,7 +116,7 @@ def pose_findings(seen: Examination, *, at_rest: bool = True) -> Iterator[Findin
             yield Finding("assembly-open", f"assembly.{start.assembly}", start.problem, start.remedy)
         else:
             assert start.state is not None
-            yield from moved_far(seen.rigid, seen.rigid.mechanism.assembly(start.assembly), start.state.q)
+            yield from large_rotations(seen.rigid, seen.rigid.mechanism.assembly(start.assembly), start.state.q)
     if seen.problem:
         yield Finding("out-of-proportion", "assembly", seen.problem, OUT_OF_PROPORTION)
     if seen.mobility is not None and seen.reach is not None:
@@ -129,7 +129,7 @@ def pose_findings(seen: Examination, *, at_rest: bool = True) -> Iterator[Findin
     yield from _vibration(seen, at_rest)
 
 
-def _mobility(free: Mobility, drives: Reach) -> Iterator[Finding]:
+def _mobility(free: Mobility, drives: DrivenFreedoms) -> Iterator[Finding]:
     if free.special:
         yield Finding(
             "special-pose", "assembly",

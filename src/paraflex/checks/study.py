@@ -10,18 +10,18 @@ import numpy as np
 
 from paraflex.actuation import actuation_condition
 from paraflex.control.shaping.shaped import ShapedPath
-from paraflex.equilibria.given import StaticsDefaults
+from paraflex.equilibria.conditions import StaticsDefaults
 from paraflex.errors import ActuationError, AssemblyError, InputError, NumericalError, UnreachablePathError
 from paraflex.files import Model
 from paraflex.findings import Finding
 from paraflex.kinematics import Circle, Path
-from paraflex.mechanism import ActuationMode, AngleLaw, Mechanism
-from paraflex.mechanism.laws import PiecewiseLaw, TabulatedLaw, marks
+from paraflex.mechanism import ActuationMode, Mechanism, TimeProfile
 from paraflex.mechanism.loads import InTime
+from paraflex.mechanism.profiles import PiecewiseProfile, TabulatedProfile, marks
 from paraflex.tracking import TrackingTask
 from paraflex.validity.actions import LOADED_AT_REST
 from paraflex.validity.numbers import STANDARD_GRAVITY, mechanism_mass, mechanism_size
-from paraflex.validity.plausibility import doubtful_torques
+from paraflex.validity.plausibility import implausible_torques
 
 # Condition number of the actuation matrix above which a nearby singular configuration dominates torques.
 ILL_CONDITIONED = 1e3
@@ -47,7 +47,7 @@ def study_findings(
     if not model.paths and path is None:
         if model.study.duration is None and model.statics == StaticsDefaults():
             yield Finding("duration-missing", "study.duration", "no path and no duration", "give one, in s")
-        yield from laws_cut_short(model.mechanism, model.study.duration)
+        yield from profiles_cut_short(model.mechanism, model.study.duration)
         yield from _few_samples(model)
         yield from _given_torques(model)
         return
@@ -120,14 +120,14 @@ def task_findings(task: TrackingTask, modes: Sequence[ActuationMode], *, magnitu
             )  # fmt: skip
         yield from _friction(task.mechanism, mode, np.max(np.abs(torques), axis=0))
         if magnitudes:
-            yield from doubtful_torques(task.system, task.driven(mode.name, torques, condition), task.motion.t)
+            yield from implausible_torques(task.system, task.driven(mode.name, torques, condition), task.motion.t)
 
 
 def path_findings(model: Model, path: Path, name: str, duration: float) -> Iterator[Finding]:
     """Yield findings about a path before it is planned."""
-    yield from laws_cut_short(model.mechanism, duration)
+    yield from profiles_cut_short(model.mechanism, duration)
     yield from _too_fast(name, path, duration)
-    yield from _idle(model.mechanism, name, path)
+    yield from _unfollowed_motion(model.mechanism, name, path)
     if duration > DWELL * path.duration > 0.0:
         yield Finding(
             "duration-long", "study.duration", f"{duration:.4g} s, where the path takes {path.duration:.4g} s",
@@ -148,7 +148,7 @@ def _too_fast(name: str, path: Path, duration: float) -> Iterator[Finding]:
         )  # fmt: skip
 
 
-def _idle(mechanism: Mechanism, name: str, path: Path) -> Iterator[Finding]:
+def _unfollowed_motion(mechanism: Mechanism, name: str, path: Path) -> Iterator[Finding]:
     """Yield a path that moves, but not along the coordinates that the end-effector follows."""
     if mechanism.end_effector is None:
         return
@@ -171,7 +171,7 @@ def _few_samples(model: Model) -> Iterator[Finding]:
     for one in model.mechanism.prescribed:
         if duration is None or model.mechanism.slides(one.joint):
             continue
-        angle, _, _ = one.law.evaluate(np.array([0.0, duration]))
+        angle, _, _ = one.profile.evaluate(np.array([0.0, duration]))
         turns = abs(float(angle[1] - angle[0])) / (2.0 * math.pi)
         if turns > 1.0 and (count - 1) < SAMPLES_A_TURN * turns:
             yield Finding(
@@ -199,14 +199,14 @@ def _turns(place: str, path: Path, orientation: float) -> Iterator[Finding]:
 
 def _driven(model: Model, task: TrackingTask, names: Sequence[str] | None) -> Iterator[Finding]:
     mechanism = model.mechanism
-    asked = model.modes(names or ())
-    if not asked:
+    requested = model.modes(names or ())
+    if not requested:
         what = "no actuation mode" if mechanism.motors else "no motor"
         yield Finding(
             "mode-missing", "mode", f"there is a path, but {what} to drive the mechanism along it",
             "add a [mode] table, or modes to [study]" if mechanism.motors else "add a [motor] table",
         )  # fmt: skip
-    yield from task_findings(task, asked, magnitudes=True)
+    yield from task_findings(task, requested, magnitudes=True)
 
 
 def _friction(mechanism: Mechanism, mode: ActuationMode, peaks: np.ndarray) -> Iterator[Finding]:
@@ -246,27 +246,27 @@ def _given_torques(model: Model) -> Iterator[Finding]:
 
 
 def _largest_torque(torque: InTime, duration: float) -> float:
-    """Return the largest magnitude of a torque up to a time, knots and rows of its law included [N m]."""
-    if not isinstance(torque, AngleLaw):
+    """Return the largest magnitude of a torque up to a time, knots and rows of its profile included [N m]."""
+    if not isinstance(torque, TimeProfile):
         return abs(torque)
     times = [*np.linspace(0.0, duration, _SAMPLES), *(time for time in marks(torque) if 0.0 <= time <= duration)]
     return float(np.max(np.abs(torque.evaluate(np.array(times))[0])))
 
 
-def laws_cut_short(mechanism: Mechanism, duration: float | None) -> Iterator[Finding]:
+def profiles_cut_short(mechanism: Mechanism, duration: float | None) -> Iterator[Finding]:
     """Yield prescribed motions and loads whose pieces or tables extend beyond the end of a run."""
-    laws = [(f"prescribed.{one.name}", one.law) for one in mechanism.prescribed]
-    laws += [(f"load.{one.name}", law) for one in mechanism.loads for law in one.laws[:1]]
-    for place, law in laws:
-        if isinstance(law, PiecewiseLaw):
-            end = law.ends[-1] if law.ends else 0.0
-        elif isinstance(law, TabulatedLaw):
-            end = law.times[-1]
+    profiles = [(f"prescribed.{one.name}", one.profile) for one in mechanism.prescribed]
+    profiles += [(f"load.{one.name}", profile) for one in mechanism.loads for profile in one.profiles[:1]]
+    for place, profile in profiles:
+        if isinstance(profile, PiecewiseProfile):
+            end = profile.ends[-1] if profile.ends else 0.0
+        elif isinstance(profile, TabulatedProfile):
+            end = profile.times[-1]
         else:
             continue
         if duration is not None and end > duration * (1.0 + _SAME_TIME):
             yield Finding(
                 "law-cut-short", place,
-                f"the run ends at {duration:.4g} s, the law goes on to {end:.4g} s",
+                f"the run ends at {duration:.4g} s, the profile goes on to {end:.4g} s",
                 "give the study a duration of at least that, in s",
             )  # fmt: skip

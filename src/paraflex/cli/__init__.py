@@ -1,4 +1,4 @@
 """Command line of paraflex: thin commands over the library."""
 
 # Exit codes; that of an interrupted command depends on the signal: see `signals.exit_code`.
-COMPLETE, TROUBLE, BAD_INPUT = 0, 1, 2
+COMPLETE, FAILURE, BAD_INPUT = 0, 1, 2

@@ -17,10 +17,10 @@ from paraflex.checks import check_planned
 from paraflex.cli.bars import bars
 from paraflex.cli.collected import apart, collected
 from paraflex.cli.commands.runs import RunRequest
-from paraflex.cli.ending import exit_code, tell
+from paraflex.cli.ending import exit_code, print_results
 from paraflex.cli.integration import check_stops, model_parameters
-from paraflex.cli.reduced import asked_reduction, kept_coordinates
-from paraflex.cli.request import acting_controllers, asked_of, at_fault, controllers_said, plan_study
+from paraflex.cli.reduced_bodies import kept_coordinates, reduced_as_requested
+from paraflex.cli.request import acting_controllers, command_provenance, controller_arguments, located_error, plan_study
 from paraflex.cli.tables import (
     below_tolerance,
     failures,
@@ -42,7 +42,7 @@ from paraflex.folders import ResultsFolder
 from paraflex.integrators import IntegrationOptions
 from paraflex.kinematics import Path
 from paraflex.mechanism import ActuationMode, Geometry, Mechanism, proportional_segments
-from paraflex.results.doubts import keep_findings, verdict_of
+from paraflex.results.findings import keep_findings, verdict_of
 from paraflex.studies import Simulator, StudyResult, TrackingStudy
 from paraflex.tracking import TrackingRun, TrackingTask, simulate
 
@@ -83,20 +83,20 @@ def run_along(
     planned = []
     # All paths are planned first, so that one that cannot be followed is refused before any run.
     for name, (path, folder) in paths.items():
-        task, full = asked_tasks(request, model, mechanism, (path, name), modes)
+        task, full = requested_tasks(request, model, mechanism, (path, name), modes)
         if request.segments is not None:
             check_stops(task.mechanism, options, request.stop_at)
         parameters = _parameters(model, name, modes, task, how, request, controllers)
-        doubts = check_planned(model, task, name, modes, request.plan.assembly)
+        findings = check_planned(model, task, name, modes, request.plan.assembly)
         method, error = own_method(request, options, controllers), model.study.error
         study = TrackingStudy(
-            task, modes, options, parameters, method, error, warning=False, findings=doubts, full=full
+            task, modes, options, parameters, method, error, warning=False, findings=findings, full=full
         )
         planned.append(_Along(name, study, folder, f'path "{name}": ' if len(paths) > 1 else ""))
     return _run(request, model, planned, _model_name(request, mechanism), began)
 
 
-def asked_tasks(
+def requested_tasks(
     request: RunRequest, model: Model, mechanism: Mechanism, along: tuple[Path, str], modes: Sequence[ActuationMode]
 ) -> tuple[TrackingTask, TrackingTask | None]:
     """Plan a path as it is run: with all coordinates, in finite segments, or with few coordinates.
@@ -107,7 +107,7 @@ def asked_tasks(
     if request.segments is not None:
         return task.in_segments(proportional_segments(mechanism, request.segments)), None
     kept = kept_coordinates(request, model.study)
-    return (task, None) if kept is None else (task.remodelled(asked_reduction(request, task, kept, modes)), task)
+    return (task, None) if kept is None else (task.remodelled(reduced_as_requested(request, task, kept, modes)), task)
 
 
 def _run(request: RunRequest, model: Model, planned: Sequence[_Along], fidelity: str, began: float) -> int:
@@ -126,7 +126,7 @@ def _run(request: RunRequest, model: Model, planned: Sequence[_Along], fidelity:
                 done[along.path] = result = _simulated(console, model, along)
                 if result.data is not None:
                     if alone:
-                        tell(result.to_dict(), show, as_json=request.json)
+                        print_results(result.to_dict(), show, as_json=request.json)
                     else:
                         warn_of(plain_console(stderr=request.json), verdict_of(result.data), along.whose)
                     places.append(_draw(console, request, along, result, began))
@@ -136,7 +136,7 @@ def _run(request: RunRequest, model: Model, planned: Sequence[_Along], fidelity:
     finally:
         if done and not alone:
             numbers = {"paths": {path: result.to_dict() for path, result in done.items()}}
-            tell(numbers, show, as_json=request.json, doubts=())
+            print_results(numbers, show, as_json=request.json, findings=())
         for place in [] if request.json else places:
             console.print(place, soft_wrap=True)
     well = len(done) == len(planned) and all(result.complete for result in done.values())
@@ -169,7 +169,7 @@ def _simulated(console: Console, model: Model, along: _Along) -> StudyResult:
             result = along.study.run(on_progress=report)
     except InputError as error:
         warn_of(console, collected(along.study.findings), along.whose)
-        raise at_fault(error, model) from None
+        raise located_error(error, model) from None
     if result.data is None:
         warn_of(console, collected(along.study.findings), along.whose)
         failures(console, result, along.whose)
@@ -229,10 +229,10 @@ def _parameters(
         "samples": int(task.motion.t.size),
         "after": task.after.value,
         "error": model.study.error,
-        "controllers": controllers_said(model, controllers),
+        "controllers": controller_arguments(model, controllers),
     }
     kept = kept_coordinates(request, model.study)
-    return asked_of(model, run | model_parameters(request, task.mechanism, kept) | how)
+    return command_provenance(model, run | model_parameters(request, task.mechanism, kept) | how)
 
 
 @contextmanager

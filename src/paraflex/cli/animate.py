@@ -11,7 +11,7 @@ from rich.console import Console
 from rich.progress import TaskProgressColumn, TimeRemainingColumn
 
 from paraflex.cli import COMPLETE, signals
-from paraflex.cli.bars import bars, begun_late
+from paraflex.cli.bars import bars, stopped_at_end
 from paraflex.cli.commands.results import AnimateRequest
 from paraflex.cli.replacing import refuse_existing
 from paraflex.cli.tables import plain_console
@@ -42,7 +42,7 @@ def animate_command(request: AnimateRequest) -> int:
         console.print("interrupted: nothing was written")
         return signals.exit_code()
     except InputError as error:
-        raise _at_fault(error, request) from None
+        raise _located_error(error, request) from None
     width, height = film.size
     if output.suffix.lower() == ".png":
         console.print(f"{width} x {height} pixels in {output}")
@@ -65,7 +65,7 @@ def _drawn(console: Console, draw: Callable[[Callable[[int, int], None]], Film])
         progress.start()
         progress.update(bar, completed=done, total=total)
 
-    with begun_late(progress):
+    with stopped_at_end(progress):
         return draw(report)
 
 
@@ -76,7 +76,7 @@ def _size(text: str) -> tuple[int, int]:
     return int(found[1]), int(found[2])
 
 
-def _at_fault(error: InputError, request: AnimateRequest) -> InputError:
+def _located_error(error: InputError, request: AnimateRequest) -> InputError:
     """Return the same error, naming the option or file it came from."""
     field = {"results": request.results, "output": request.output}.get(error.field, error.field)
     if error.field in (*_OPTIONS, "size", "mode"):

@@ -11,7 +11,7 @@ from typing import Annotated, Any
 
 import typer
 
-from paraflex.cli import BAD_INPUT, TROUBLE
+from paraflex.cli import BAD_INPUT, FAILURE
 from paraflex.cli.collected import collecting
 from paraflex.cli.commands.once import Command
 from paraflex.cli.commands.requests import with_options
@@ -49,8 +49,8 @@ def all_commands(group: Any) -> dict[str, Any]:
     return found
 
 
-def _show_version(wanted: bool) -> None:
-    if wanted:
+def _show_version(requested: bool) -> None:
+    if requested:
         from importlib.metadata import version
 
         typer.echo(f"paraflex {version('paraflex')}")
@@ -73,23 +73,25 @@ def main() -> None:
     try:
         app()
     except InputError as error:
-        _complain(error)
+        _print_error(error)
         sys.exit(BAD_INPUT)
     except ParaflexError as error:
-        _complain(error)
-        sys.exit(TROUBLE)
+        _print_error(error)
+        sys.exit(FAILURE)
     except OSError as error:
         # A file name that is too long raises this error wherever the file is first looked up.
         if error.errno != errno.ENAMETOOLONG:
             raise
-        _complain(InputError("the name is too long", field="file", value=error.filename, remedy="choose a shorter one"))
+        _print_error(
+            InputError("the name is too long", field="file", value=error.filename, remedy="choose a shorter one")
+        )
         sys.exit(BAD_INPUT)
     except Exception as error:
         # An unsealed file may hold anything and so lead to any error; otherwise the traceback is wanted.
         if not unsealed:
             raise
         why = f"holds something other than what paraflex writes ({type(error).__name__})"
-        _complain(InputError(why, field=str(unsealed[-1]), remedy="repeat the command that wrote it"))
+        _print_error(InputError(why, field=str(unsealed[-1]), remedy="repeat the command that wrote it"))
         sys.exit(BAD_INPUT)
     except KeyboardInterrupt as interrupt:
         typer.echo(": ".join(["interrupted", *map(str, interrupt.args)]), err=True)
@@ -108,5 +110,5 @@ def _set_up() -> None:
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 
-def _complain(error: Exception) -> None:
+def _print_error(error: Exception) -> None:
     typer.echo(f"error: {error}", err=True)

@@ -29,7 +29,7 @@ def counting(console: Console) -> Iterator[OnProgress]:
 
 
 @contextmanager
-def begun_late(progress: Progress) -> Iterator[None]:
+def stopped_at_end(progress: Progress) -> Iterator[None]:
     """Stop progress bars at the end of the context, if they were started.
 
     The first report of progress starts them, so that an error before it prints one line only.

@@ -10,7 +10,7 @@ from rich.console import Console
 from paraflex.cli import COMPLETE
 from paraflex.cli.commands.requests import flagged
 from paraflex.cli.commands.results import CompareRequest
-from paraflex.cli.ending import say_where, tell
+from paraflex.cli.ending import print_location, print_results
 from paraflex.cli.replacing import hold_results
 from paraflex.cli.tables import print_table
 from paraflex.figures.comparison import motion_table, number_table, setting_table
@@ -31,11 +31,11 @@ def compare_command(request: CompareRequest) -> int:
             # The numbers are written first: a failure while figures are drawn does not lose them.
             with folder.replaced() as new:
                 write_json(new / "compare.json", found.to_dict())
-            with folder.amended() as new:
+            with folder.added_files() as new:
                 save_overlays(found, new / "figures")
-    tell(found.to_dict(), lambda out: print_compared(out, found), as_json=request.json, doubts=())
+    print_results(found.to_dict(), lambda out: print_compared(out, found), as_json=request.json, findings=())
     if request.out is not None and not request.json:
-        say_where(began, "numbers and figures", Path(request.out))
+        print_location(began, "numbers and figures", Path(request.out))
     return COMPLETE
 
 

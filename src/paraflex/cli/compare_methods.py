@@ -8,10 +8,10 @@ from paraflex.cli.bars import counting
 from paraflex.cli.commands.requests import flagged
 from paraflex.cli.commands.runs import CompareMethodsRequest
 from paraflex.cli.compare_methods_tables import print_comparison
-from paraflex.cli.ending import exit_code, say_where, tell
+from paraflex.cli.ending import exit_code, print_location, print_results
 from paraflex.cli.motion import own_motion, start_of
 from paraflex.cli.replacing import hold_results
-from paraflex.cli.request import asked_model, asked_of, blaming, find_mode, find_path, plan_study
+from paraflex.cli.request import command_provenance, find_mode, find_path, locating_errors, plan_study, requested_model
 from paraflex.cli.tables import plain_console
 from paraflex.cli.writing import write_drawn
 from paraflex.compilation import compile_kernels_for
@@ -27,7 +27,7 @@ from paraflex.studies import Case, ComparisonOptions, ComparisonStudy, motion_ca
 
 def compare_methods_command(request: CompareMethodsRequest) -> int:
     """Run all methods, write their time, work and errors; return the exit code."""
-    model = asked_model(request.model)
+    model = requested_model(request.model)
     options = _options(request)
     with renamed("--method"):
         methods = [find_method(name).name for name in request.methods or METHODS]
@@ -54,19 +54,19 @@ def _compare(
     else:
         path, name = find_path(model, request.path)
         case = tracking_case(plan_study(model, model.mechanism, path, name, request.plan), mode)
-    asked = {"limit": options.limit, "repetitions": options.repetitions}
-    asked |= {"tolerances": list(options.tolerances), "steps": list(options.steps), "case": case.name}
-    study = ComparisonStudy(case, methods, options, asked_of(model, asked))
+    requested = {"limit": options.limit, "repetitions": options.repetitions}
+    requested |= {"tolerances": list(options.tolerances), "steps": list(options.steps), "case": case.name}
+    study = ComparisonStudy(case, methods, options, command_provenance(model, requested))
     with counting(console) as report:
         comparison = study.run(on_progress=report)
     summary = comparison.to_dict()
     if comparison.measurements:
         comparison.save_in(folder)
-    tell(summary, lambda out: print_comparison(out, summary), as_json=request.json, doubts=())
+    print_results(summary, lambda out: print_comparison(out, summary), as_json=request.json, findings=())
     if comparison.measurements:
         write_drawn(summary, folder)
         if not request.json:
-            say_where(began, "numbers and figure", folder.path)
+            print_location(began, "numbers and figure", folder.path)
     done = any(run.status == "complete" for run in comparison.measurements)
     return exit_code(done, interrupted=comparison.interrupted)
 
@@ -99,7 +99,7 @@ def _motion(model: Model, request: CompareMethodsRequest) -> Case:
     study = own_motion(model, request.plan)
     mechanism = standing(model.mechanism, study.assembly, model.start)
     assert study.duration is not None
-    with blaming(model):
+    with locating_errors(model):
         start = start_of(model, mechanism, study.assembly, balanced=False)
         if start is None:
             start = consistent_state(build_system(mechanism), mechanism.assembly(study.assembly))

@@ -11,9 +11,16 @@ from paraflex.cli.collected import collected
 from paraflex.cli.commands.control import CompareLawsRequest
 from paraflex.cli.commands.requests import flagged
 from paraflex.cli.control_tables import print_laws
-from paraflex.cli.ending import exit_code, say_where, tell
+from paraflex.cli.ending import exit_code, print_location, print_results
 from paraflex.cli.replacing import hold_results
-from paraflex.cli.request import asked_model, asked_of, blaming, find_modes, find_paths, plan_study
+from paraflex.cli.request import (
+    command_provenance,
+    find_modes,
+    find_paths,
+    locating_errors,
+    plan_study,
+    requested_model,
+)
 from paraflex.cli.tables import plain_console
 from paraflex.cli.writing import write_drawn
 from paraflex.compilation import compile_kernels_for
@@ -31,8 +38,8 @@ Paths = dict[str, Path]
 
 def compare_laws_command(request: CompareLawsRequest) -> int:
     """Run every control law in every mode, write the table and its figure; return the exit code."""
-    model = asked_model(request.model)
-    with blaming(model):
+    model = requested_model(request.model)
+    with locating_errors(model):
         laws = laws_of(model, request.controllers)
     paths, modes = find_paths(model, request.paths), find_modes(model, request.modes)
     # All checks that need no computation come before the long runs.
@@ -54,13 +61,13 @@ def _compare(
         console.print("interrupted before any law had run; nothing is written", soft_wrap=True)
         return exit_code(False, interrupted=result.interrupted)
     result.save_in(folder)
-    doubts = collected(
+    findings = collected(
         check_planned(model, next(iter(study.tasks.values())), next(iter(paths)), modes, request.plan.assembly)
     )
-    tell(result.to_dict(), lambda out: print_laws(out, result), as_json=request.json, doubts=doubts)
+    print_results(result.to_dict(), lambda out: print_laws(out, result), as_json=request.json, findings=findings)
     write_drawn(result.data, folder)
     if not request.json:
-        say_where(began, "table and figure", folder.path)
+        print_location(began, "table and figure", folder.path)
     return exit_code(bool((result.data["status"] == "complete").any()), interrupted=result.interrupted)
 
 
@@ -70,7 +77,7 @@ def _study(request: CompareLawsRequest, model: Model, laws: Laws, paths: Paths, 
     with flagged(request):
         chosen = {name: getattr(request, name) for name in ("tolerance", "method", "step")}
         options = model.study.integration(chosen)
-        asked = {
+        requested = {
             "laws": {name: [one.name for one in together] for name, together in laws.items()},
             "paths": list(paths),
             "modes": [mode.name for mode in modes],
@@ -78,5 +85,5 @@ def _study(request: CompareLawsRequest, model: Model, laws: Laws, paths: Paths, 
         }
         return LawStudy(
             reduced_tasks(model, tasks, modes), laws, modes, options, request.metrics, ErrorSpan(model.study.error),
-            asked_of(model, asked | options.to_dict()),
+            command_provenance(model, requested | options.to_dict()),
         )  # fmt: skip

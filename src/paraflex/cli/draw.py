@@ -18,9 +18,9 @@ from paraflex.checks.drawing import pose_of
 from paraflex.cli import COMPLETE
 from paraflex.cli.commands.models import DrawRequest
 from paraflex.cli.replacing import refuse_existing
-from paraflex.cli.request import asked_model
+from paraflex.cli.request import requested_model
 from paraflex.cli.tables import few, framed_table, plain_console
-from paraflex.equilibria.given import StaticsDefaults
+from paraflex.equilibria.conditions import StaticsDefaults
 from paraflex.errors import InputError
 from paraflex.files import Model
 from paraflex.mechanism import Mechanism
@@ -55,7 +55,7 @@ def draw_command(request: DrawRequest) -> int:
                 remedy="end it in .html, .svg, .png or .pdf",
             )  # fmt: skip
         refuse_existing(output, request.force)
-    model = asked_model(request.model)
+    model = requested_model(request.model)
     shown = pose_of(model, assembly=request.assembly, path=request.path)
     if output is None:
         output = Path(tempfile.mkdtemp(prefix="paraflex-")) / f"{portable_name(model.mechanism.name)}.html"
@@ -63,9 +63,9 @@ def draw_command(request: DrawRequest) -> int:
     from paraflex.plots.model_drawing import model_drawing
 
     _write(model_drawing(shown, theme_name=request.theme), shown, output)
-    _tell(plain_console(), model, shown, request, output)
-    wanted = (request.output is None and _has_screen()) if request.open is None else request.open
-    if wanted and not webbrowser.open(output.resolve().as_uri()):
+    _print_result(plain_console(), model, shown, request, output)
+    opens = (request.output is None and _has_screen()) if request.open is None else request.open
+    if opens and not webbrowser.open(output.resolve().as_uri()):
         plain_console(stderr=True).print("no browser opens it here", soft_wrap=True)
     return COMPLETE
 
@@ -93,7 +93,7 @@ def _has_screen() -> bool:
     return screen and sys.stdout.isatty()
 
 
-def _tell(console: Console, model: Model, shown: Posed, request: DrawRequest, output: Path) -> None:
+def _print_result(console: Console, model: Model, shown: Posed, request: DrawRequest, output: Path) -> None:
     """Print joints, bodies, drives, loads, sensors, open joints, the name of the drawing and the next commands."""
     mechanism = model.mechanism
     console.print(f"{mechanism.name} ({model.source})", soft_wrap=True)

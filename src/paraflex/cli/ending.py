@@ -10,7 +10,7 @@ from typing import Any
 
 from rich.console import Console
 
-from paraflex.cli import COMPLETE, TROUBLE, signals
+from paraflex.cli import COMPLETE, FAILURE, signals
 from paraflex.cli.commands.options import DrawnChoice
 from paraflex.cli.tables import plain_console, warn_of
 from paraflex.findings import Finding
@@ -20,11 +20,15 @@ def exit_code(well: bool, *, interrupted: bool) -> int:
     """Return the exit code of a command that succeeded, failed or was interrupted."""
     if interrupted:
         return signals.exit_code()
-    return COMPLETE if well else TROUBLE
+    return COMPLETE if well else FAILURE
 
 
-def tell(
-    numbers: dict[str, Any], show: Callable[[Console], None], *, as_json: bool, doubts: Iterable[Finding] | None = None
+def print_results(
+    numbers: dict[str, Any],
+    show: Callable[[Console], None],
+    *,
+    as_json: bool,
+    findings: Iterable[Finding] | None = None,
 ) -> None:
     """Print results as JSON or as tables, preceded by the findings that make them doubtful (on stderr for JSON).
 
@@ -36,20 +40,20 @@ def tell(
         Function that prints tables to a console.
     as_json : bool
         Whether to print JSON instead of tables.
-    doubts : iterable of Finding, optional
+    findings : iterable of Finding, optional
         Findings to print; by default those of the verdict in `numbers`.
     """
     out = plain_console()
-    if doubts is None:
-        doubts = map(Finding.from_dict, numbers["verdict"]["findings"])
-    warn_of(plain_console(stderr=True) if as_json else out, doubts)
+    if findings is None:
+        findings = map(Finding.from_dict, numbers["verdict"]["findings"])
+    warn_of(plain_console(stderr=True) if as_json else out, findings)
     if as_json:
         print(json.dumps(numbers, indent=2))
     else:
         show(out)
 
 
-def say_where(began: float, what: str, folder: Path, drawn: DrawnChoice | None = None) -> None:
+def print_location(began: float, what: str, folder: Path, drawn: DrawnChoice | None = None) -> None:
     """Print the last line of a command: elapsed time, and folder of the results."""
     plain_console(stderr=True).print(where(began, what, folder, drawn), soft_wrap=True)
 

@@ -26,7 +26,7 @@ def _report(console: Console, result: IdentificationResult) -> None:
     for reason in dict.fromkeys(found.reasons.values()):
         names = ", ".join(name for name, why in found.reasons.items() if why == reason)
         console.print(f"deviations not given of {names}: {reason}", soft_wrap=True)
-    if found.telling:
+    if found.identifiable:
         console.print(f"condition of the Jacobian {number(found.condition, 3)}, degrees of freedom {found.freedom}")
     else:
         described = ", ".join(f"{share:+.2f} {name}" for name, share in found.weakest.items())

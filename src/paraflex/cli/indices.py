@@ -9,7 +9,7 @@ from rich.console import Console
 from paraflex.cli import COMPLETE, signals
 from paraflex.cli.bars import bars
 from paraflex.cli.commands.studies import IndicesRequest
-from paraflex.cli.ending import tell
+from paraflex.cli.ending import print_results
 from paraflex.cli.tables import plain_console, print_table
 from paraflex.compilation import compile_kernels_for
 from paraflex.figures.search import index_table
@@ -40,7 +40,7 @@ def indices_command(request: IndicesRequest) -> int:
         _report(out, result, numbers)
         console.print(f"indices: {result.table}; every run: {result.sweep.table}", soft_wrap=True)
 
-    tell(numbers | {"verdict": verdict.to_dict()}, show, as_json=request.json, doubts=verdict)
+    print_results(numbers | {"verdict": verdict.to_dict()}, show, as_json=request.json, findings=verdict)
     save_figures(numbers, request.folder / "figures")
     return COMPLETE
 

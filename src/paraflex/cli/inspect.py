@@ -12,15 +12,14 @@ from paraflex.cli.collected import printed
 from paraflex.cli.commands.models import InfoRequest
 from paraflex.cli.frequencies import frequencies, hertz
 from paraflex.cli.inspect_tables import print_facts, print_library
-from paraflex.cli.request import asked_model
-from paraflex.dynamics import Closure, Mobility, Reach, System, build_system, closure_of, mobility
+from paraflex.cli.request import requested_model
+from paraflex.dynamics import Closure, DrivenFreedoms, Mobility, System, build_system, closure_of, mobility
 from paraflex.errors import ProportionError
 from paraflex.files import Model, library_names, load
 from paraflex.findings import Finding, Level
 from paraflex.formatting import speed_text
 from paraflex.mechanism import (
     Actuator,
-    AngleLaw,
     AppliedTorque,
     ConstantSpeed,
     Mechanism,
@@ -28,6 +27,7 @@ from paraflex.mechanism import (
     PrescribedAngle,
     Relation,
     SumRelation,
+    TimeProfile,
     actuator_motors,
     grouped,
     loops,
@@ -43,7 +43,7 @@ def info_command(request: InfoRequest) -> int:
         facts: Any = library()
         verdict = None
     else:
-        facts = describe(asked_model(request.model), request)
+        facts = describe(requested_model(request.model), request)
         verdict = facts["verdict"]["level"]
         # The findings are printed with the facts.
         printed(map(Finding.from_dict, facts["verdict"]["findings"]))
@@ -128,7 +128,7 @@ def _counts(model: Model, system: System, rigid: System) -> dict[str, Any]:
         "assemblies": [assembly.name for assembly in mechanism.assemblies],
         "modes": [mode.name for mode in mechanism.modes],
         "paths": list(model.paths),
-        **{group.words: list(map(_equation, members)) for group, members in grouped(mechanism) if group.relates},
+        **{group.plural_noun: list(map(_equation, members)) for group, members in grouped(mechanism) if group.relates},
         "sensors": [sensor.name for sensor in mechanism.sensors],
     }
 
@@ -150,16 +150,16 @@ def _actuator(mechanism: Mechanism, actuator: Actuator) -> str:
 
 def _load(load: PointForce | AppliedTorque) -> str:
     """Return name, kind, components and place of a load; a component that depends on time reads "in time"."""
-    parts = ["in time" if isinstance(one, AngleLaw) else f"{one:.4g}" for one in load.components]
+    parts = ["in time" if isinstance(one, TimeProfile) else f"{one:.4g}" for one in load.components]
     size = f"({', '.join(parts)})" if len(parts) > 1 else parts[0]
     return f"{load.name}: {load.kind} {size} {load.unit} at {load.point}"
 
 
 def _drive(drive: PrescribedAngle, unit: str) -> str:
     """Return name, joint and speed of a prescribed motion; "in time" if the speed is not constant."""
-    law = drive.law
+    profile = drive.profile
     return f"{drive.name}: joint {drive.joint}, " + (
-        speed_text(law.speed, unit) if isinstance(law, ConstantSpeed) else "in time"
+        speed_text(profile.speed, unit) if isinstance(profile, ConstantSpeed) else "in time"
     )
 
 
@@ -214,7 +214,7 @@ def _mobility_facts(free: Mobility) -> dict[str, Any]:
     }
 
 
-def _reach_facts(drives: Reach) -> dict[str, Any]:
+def _reach_facts(drives: DrivenFreedoms) -> dict[str, Any]:
     return {
         "all_motors": drives.all_motors,
         "modes": dict(drives.modes),

@@ -72,7 +72,7 @@ def print_verdict(console: Console, facts: dict[str, Any]) -> None:
 
 def _counts(facts: dict[str, Any]) -> Table:
     table = Table(show_header=False, box=None)
-    related = [group.words for group in groups_of(Mechanism).values() if group.relates or group.measures]
+    related = [group.plural_noun for group in groups_of(Mechanism).values() if group.relates or group.measures]
     for label, key in (
         ("bodies", "bodies"),
         ("joints", "joints"),

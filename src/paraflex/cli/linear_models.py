@@ -13,7 +13,15 @@ from paraflex.checks import BALANCED
 from paraflex.cli.commands.models import LinearRequest
 from paraflex.cli.commands.options import PlanChoice
 from paraflex.cli.commands.requests import conflict, flagged
-from paraflex.cli.request import asked_model, asked_of, blaming, find_modes, find_path, of_assembly, plan_study
+from paraflex.cli.request import (
+    command_provenance,
+    find_modes,
+    find_path,
+    locating_errors,
+    of_assembly,
+    plan_study,
+    requested_model,
+)
 from paraflex.cli.tables import plain_console
 from paraflex.compilation import compile_kernels_for
 from paraflex.dynamics import State, build_system, pose_at_rest, standing_system, undeformed
@@ -36,7 +44,7 @@ _MOST_MOMENTS = 10_000
 _SAMPLES = 1001
 
 
-class AskedModels(NamedTuple):
+class RequestedModels(NamedTuple):
     """Linear models, one for each mode, with the motions that they are about (none at rest) and their provenance."""
 
     models: list[LinearModel]
@@ -47,18 +55,18 @@ class AskedModels(NamedTuple):
     model: Model
 
 
-def asked_models(request: LinearRequest, command: str) -> Callable[[], AskedModels]:
+def requested_models(request: LinearRequest, command: str) -> Callable[[], RequestedModels]:
     """Return a function that computes the linear models, after all checks that need no computation."""
     _check(request)
     name = request.model.name
     if Path(name).suffix == ".nc" or (Path(name).is_dir() and name not in library_names()):
         return _of_results(request, command)
-    model = asked_model(request.model)
+    model = requested_model(request.model)
     modes = _modes(model, request)
     return lambda: _models(model, modes, request, command)
 
 
-def _of_results(request: LinearRequest, command: str) -> Callable[[], AskedModels]:
+def _of_results(request: LinearRequest, command: str) -> Callable[[], RequestedModels]:
     """Return a function that computes linear models about the runs of a results folder, which it repeats."""
     given = {"--set": request.model.settings, "--pose": request.pose, "--balanced": request.balanced,
              "--path": request.path, "--assembly": request.assembly}  # fmt: skip
@@ -72,7 +80,7 @@ def _of_results(request: LinearRequest, command: str) -> Callable[[], AskedModel
 
     model, runs = repeated_runs(request.model.name, [] if ALL in request.modes else request.modes)
 
-    def models() -> AskedModels:
+    def models() -> RequestedModels:
         found = list(runs)
         modes = [run.mode if isinstance(run, TrackingRun) else _everything(model.mechanism) for run in found]
         parameters = _parameters(model, modes, request, command)
@@ -127,14 +135,14 @@ def _everything(mechanism: Mechanism) -> ActuationMode:
     return ActuationMode("all motors" if motors else "no motors", motors)
 
 
-def _models(model: Model, modes: Sequence[ActuationMode], request: LinearRequest, command: str) -> AskedModels:
+def _models(model: Model, modes: Sequence[ActuationMode], request: LinearRequest, command: str) -> RequestedModels:
     """Return the linear models in all modes, at rest or about the planned motion."""
     ports = _ports(request)
     with flagged(request):
         if request.at is None and request.along is None and request.path is None:
-            pose = pose_asked(model, request.pose, request.assembly, "--pose")
+            pose = requested_pose(model, request.pose, request.assembly, "--pose")
             models = [_at_rest(model, pose, mode, request.balanced, ports) for mode in modes]
-            return AskedModels(models, [], list(modes), ports, _parameters(model, modes, request, command), model)
+            return RequestedModels(models, [], list(modes), ports, _parameters(model, modes, request, command), model)
         motion = _motion(model, request)
         return _moving([motion] * len(modes), model, modes, request, _parameters(model, modes, request, command))
 
@@ -150,16 +158,16 @@ def _moving(
     modes: Sequence[ActuationMode],
     request: LinearRequest,
     parameters: dict[str, Any],
-) -> AskedModels:
+) -> RequestedModels:
     """Return linear models about motions, one for each mode."""
     ports = _ports(request)
     with flagged(request):
         pairs = zip(motions, modes, strict=True)
         about = [_in_motion(motion, mode, request.at or 0.0, ports) for motion, mode in pairs]
-        return AskedModels(about, list(motions), list(modes), ports, parameters, model)
+        return RequestedModels(about, list(motions), list(modes), ports, parameters, model)
 
 
-def moments_along(found: AskedModels, count: int) -> list[list[LinearModel]]:
+def moments_along(found: RequestedModels, count: int) -> list[list[LinearModel]]:
     """Return linear models at `count` equidistant instants of the motions, for each mode."""
     motion = found.motions[0]
     times = motion.motion.t if isinstance(motion, TrackingTask) else motion.solution.t
@@ -168,17 +176,17 @@ def moments_along(found: AskedModels, count: int) -> list[list[LinearModel]]:
     return [[_in_motion(motion, mode, at, found.ports) for at in moments] for motion, mode in pairs]
 
 
-def pose_asked(model: Model, wanted: str | None, assembly: str | None, flag: str) -> State:
+def requested_pose(model: Model, name: str | None, assembly: str | None, flag: str) -> State:
     """Return the pose at rest that an option names; by default the model's start, or the pose of an assembly."""
     mechanism = model.mechanism
     system = standing_system(mechanism, model.start, assembly or model.study.assembly)
     try:
-        if wanted is not None and "," in wanted:
-            return _at_place(model, wanted, flag)
-        if wanted in [one.name for one in mechanism.assemblies]:
-            return pose_at_rest(standing_system(mechanism, wanted), None, wanted)
-        if wanted is not None and (wanted != START or model.start is None):
-            raise InputError("no such pose", field=flag, value=wanted, remedy=_poses(model))
+        if name is not None and "," in name:
+            return _at_place(model, name, flag)
+        if name in [one.name for one in mechanism.assemblies]:
+            return pose_at_rest(standing_system(mechanism, name), None, name)
+        if name is not None and (name != START or model.start is None):
+            raise InputError("no such pose", field=flag, value=name, remedy=_poses(model))
         return pose_at_rest(system, model.start, assembly or model.study.assembly)
     except AssemblyError as error:
         raise of_assembly(error, model) from error
@@ -249,7 +257,7 @@ def _motion(model: Model, request: LinearRequest) -> TrackingTask | MotionRun:
         )
     compile_kernels_for(model.mechanism, plain_console(stderr=True).print)
     until = study.duration if request.along is not None or not request.at else request.at
-    with blaming(model):
+    with locating_errors(model):
         return simulate_motion(
             model.mechanism, until, samples=_SAMPLES, torques=study.torques,
             start=model.start or request.assembly or study.assembly,
@@ -268,7 +276,7 @@ def _in_motion(motion: Motion, mode: ActuationMode, at: float, ports: dict[str, 
 
 def _parameters(model: Model, modes: Iterable[ActuationMode], request: LinearRequest, command: str) -> dict[str, Any]:
     """Return the provenance of the linear models."""
-    asked = {name: getattr(request, name) for name in ("pose", "balanced", "at", "along", "path", "assembly", "forces",
-                                                        "prescribed", "coordinates")}  # fmt: skip
-    run = {name: value for name, value in asked.items() if value not in (None, False, [], "motors")}
-    return asked_of(model, {command: True, "modes": [mode.name for mode in modes]} | run)
+    names = ("pose", "balanced", "at", "along", "path", "assembly", "forces", "prescribed", "coordinates")
+    requested = {name: getattr(request, name) for name in names}
+    run = {name: value for name, value in requested.items() if value not in (None, False, [], "motors")}
+    return command_provenance(model, {command: True, "modes": [mode.name for mode in modes]} | run)

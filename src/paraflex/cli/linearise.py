@@ -8,7 +8,7 @@ from paraflex.cli import COMPLETE
 from paraflex.cli.commands.models import LineariseRequest
 from paraflex.cli.commands.requests import flagged
 from paraflex.cli.dataset_command import DatasetCommand
-from paraflex.cli.linear_models import AskedModels, asked_models, moments_along
+from paraflex.cli.linear_models import RequestedModels, moments_along, requested_models
 from paraflex.cli.linearise_tables import print_linear
 from paraflex.results.linear_data import linear_dataset
 from paraflex.results.linear_summary import linear_summary
@@ -16,15 +16,15 @@ from paraflex.results.linear_summary import linear_summary
 
 def linearise_command(request: LineariseRequest) -> int:
     """Linearise in every mode, print poles and zeros and, with --out, write files; return the exit code."""
-    make = asked_models(request, "linearise")
+    make = requested_models(request, "linearise")
     _COMMAND.run(request.files, lambda: _data(make(), request))
     return COMPLETE
 
 
-def _data(found: AskedModels, request: LineariseRequest) -> xr.Dataset:
+def _data(found: RequestedModels, request: LineariseRequest) -> xr.Dataset:
     with flagged(request):
         along = [] if request.along is None else moments_along(found, request.along)
         return linear_dataset(found.models, along=along, parameters=found.parameters)
 
 
-_COMMAND = DatasetCommand("linear", linear_summary, print_linear, doubts=())
+_COMMAND = DatasetCommand("linear", linear_summary, print_linear, findings=())

@@ -13,9 +13,9 @@ import numpy as np
 from paraflex.actuation import Effort, actuation_condition
 from paraflex.actuation.allocation import check_mode
 from paraflex.cli.commands.models import ModesRequest
-from paraflex.cli.request import asked_model, find_path
+from paraflex.cli.request import find_path, requested_model
 from paraflex.cli.tables import plain_console, print_table
-from paraflex.dynamics import build_system, closure_of, mobility, reach
+from paraflex.dynamics import build_system, closure_of, driven_freedoms, mobility
 from paraflex.errors import ActuationError
 from paraflex.figures.modes import mode_table
 from paraflex.files import Model
@@ -32,7 +32,7 @@ def modes_command(request: ModesRequest) -> None:
 
     For a model without named modes, list the sets of motors that could be requested.
     """
-    model, path = asked_model(request.model), request.path
+    model, path = requested_model(request.model), request.path
     effort = _effort(model, path)
     # Modes of [mode] tables, and further ones of the study.
     studied = [parse_mode(model.mechanism, name) for name in model.study.modes]
@@ -104,7 +104,7 @@ def _sets_of_pose(model: Model) -> Iterable[tuple[str, ...]]:
         return ()
     system = build_system(model.mechanism.rigid())
     start = closure_of(system, model.mechanism.assembly(model.study.assembly)).state
-    return () if start is None else reach(system, start, mobility(system, start).freedoms).sets
+    return () if start is None else driven_freedoms(system, start, mobility(system, start).freedoms).sets
 
 
 def _explain(model: Model, path: str | None, rows: list[dict[str, Any]], more: int) -> list[str]:

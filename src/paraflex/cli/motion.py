@@ -12,15 +12,15 @@ from rich.console import Console
 from rich.progress import TimeElapsedColumn
 
 from paraflex.checks import check
-from paraflex.cli.bars import bars, begun_late
+from paraflex.cli.bars import bars, stopped_at_end
 from paraflex.cli.collected import collected
 from paraflex.cli.commands.options import PlanChoice
 from paraflex.cli.commands.runs import RunRequest
-from paraflex.cli.ending import exit_code, tell
+from paraflex.cli.ending import exit_code, print_results
 from paraflex.cli.integration import model_parameters
-from paraflex.cli.reduced import asked_reduction, kept_coordinates
+from paraflex.cli.reduced_bodies import kept_coordinates, reduced_as_requested
 from paraflex.cli.replacing import hold_results
-from paraflex.cli.request import acting_controllers, asked_of, blaming, controllers_said
+from paraflex.cli.request import acting_controllers, command_provenance, controller_arguments, locating_errors
 from paraflex.cli.tables import controllers, loads, plain_console, reduction, validity
 from paraflex.cli.writing import write_drawn_run, write_numbers
 from paraflex.compilation import compile_kernels_for
@@ -34,9 +34,9 @@ from paraflex.folders import RUN, ResultsFolder
 from paraflex.integrators import IntegrationOptions
 from paraflex.mechanism import Mechanism
 from paraflex.motion import MotionRun, simulate_motion, state_at
-from paraflex.reduction import size_of
+from paraflex.reduced_bodies import size_of
 from paraflex.results import motion_dataset, motion_summary
-from paraflex.results.reduced_runs import beside_full
+from paraflex.results.reduced_runs import compared_with_full
 
 # Largest number of singular positions listed.
 _MOST_TIMES = 4
@@ -88,25 +88,25 @@ def _run_held(
     run, kept = full, kept_coordinates(request, study)
     # A full run that failed is no reference for a reduced one.
     if kept is not None and full.solution.status in DONE_STATUSES:
-        few = asked_reduction(request, full, kept)
+        few = reduced_as_requested(request, full, kept)
         start = None
         if not request.balanced:
             start = nearest_state(build_system(few), full.system, State(0.0, full.solution.q[0], full.solution.v[0]))
         run = _simulate(console, model, few, options, controllers, balanced=request.balanced, start=start)
-    asked = {
+    requested = {
         "duration": study.duration,
         "samples": study.samples,
-        "controllers": controllers_said(model, controllers),
+        "controllers": controller_arguments(model, controllers),
     }
-    parameters = asked_of(model, asked | model_parameters(request, mechanism, kept) | how)
+    parameters = command_provenance(model, requested | model_parameters(request, mechanism, kept) | how)
     seen = check(model, assembly=request.plan.assembly)
     data = motion_dataset(run, options=options, parameters=parameters, findings=collected(seen))
     if run is not full:
         sizes = [size_of(one.system, State(0.0, one.solution.q[0], one.solution.v[0])) for one in (run, full)]
-        data = beside_full(data, motion_dataset(full, options=options), *sizes)
+        data = compared_with_full(data, motion_dataset(full, options=options), *sizes)
     summary = motion_summary(data)
     write_numbers(data, summary, folder)
-    tell(summary, lambda out: _report(out, summary), as_json=request.json)
+    print_results(summary, lambda out: _report(out, summary), as_json=request.json)
     finished = run.solution.status in DONE_STATUSES
     try:
         place = write_drawn_run(data, folder, request, began)
@@ -155,7 +155,7 @@ def _simulate(
         progress.update(bar, completed=reached)
 
     try:
-        with blaming(model), begun_late(progress), warnings.catch_warnings():
+        with locating_errors(model), stopped_at_end(progress), warnings.catch_warnings():
             begun = start or start_of(model, mechanism, study.assembly, balanced=balanced) or study.assembly
             # The table and the summary report these findings.
             warnings.simplefilter("ignore", ValidityWarning)

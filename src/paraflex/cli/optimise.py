@@ -17,7 +17,7 @@ def optimise_command(request: SearchRequest) -> int:
 
 
 def _report(console: Console, result: OptimisationResult) -> None:
-    for name, limit in [] if result.holds_limits else result.sought["limits"]:
+    for name, limit in [] if result.holds_limits else result.goal["limits"]:
         unit, value = result.units[name], result.metrics[name]
         if value > limit:
             shown = common_unit(unit, (limit, value - limit))

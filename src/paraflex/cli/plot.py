@@ -30,8 +30,8 @@ def plot_command(request: PlotRequest) -> int:
         chosen = [figure for figure in figures_of(source) if figure.points or not request.points] or figures_of(source)
     else:
         chosen = list(dict.fromkeys(find_figure(source, name) for name in request.figures))
-    asked = (request.modes, request.metrics, request.points)
-    drawn = [drawing for figure in chosen for drawing in drawings(source, figure, *asked)]
+    requested = (request.modes, request.metrics, request.points)
+    drawn = [drawing for figure in chosen for drawing in drawings(source, figure, *requested)]
     # Matplotlib takes longer to import than everything up to here, so it is imported only now.
     from paraflex.plots.save import write_figures
 

@@ -11,13 +11,13 @@ from functools import partial
 import xarray as xr
 from typer.main import Typer, get_command
 
-from paraflex.cli.along import asked_tasks, own_method
+from paraflex.cli.along import own_method, requested_tasks
 from paraflex.cli.commands.requests import filled, with_options
 from paraflex.cli.commands.runs import RunRequest
 from paraflex.cli.integration import integration_options
 from paraflex.cli.motion import free_run, own_motion, start_of
-from paraflex.cli.request import acting_controllers, asked_model, find_path
-from paraflex.cli.run import asked_mechanism
+from paraflex.cli.request import acting_controllers, find_path, requested_model
+from paraflex.cli.run import requested_mechanism
 from paraflex.cli.tables import plain_console
 from paraflex.compilation import compile_kernels_for
 from paraflex.errors import InputError
@@ -58,7 +58,7 @@ def repeated_runs(results: str, modes: Sequence[str] = ()) -> tuple[Model, Itera
 
 def _model(data: xr.Dataset, request: RunRequest, results: str) -> Model:
     """Return the model of a run from its file; raise InputError if the file has changed since."""
-    model = asked_model(request.model)
+    model = requested_model(request.model)
     then, now = json.loads(data.attrs["parameters"]).get("model"), json.loads(json.dumps(dict(model.parameters)))
     if then != now:
         raise InputError(
@@ -86,7 +86,7 @@ def _request(data: xr.Dataset, results: str) -> RunRequest:
 def _runs(
     model: Model, request: RunRequest, path: str | None, modes: Sequence[str]
 ) -> Iterator[TrackingRun | MotionRun]:
-    mechanism, options = asked_mechanism(model, request), integration_options(request, model.study)
+    mechanism, options = requested_mechanism(model, request), integration_options(request, model.study)
     compile_kernels_for(mechanism, plain_console(stderr=True).print)
     controllers = acting_controllers(model, request)
     if path is None:
@@ -95,7 +95,7 @@ def _runs(
         yield free_run(replace(model, study=study), mechanism, options, controllers, start)
         return
     chosen = [parse_mode(mechanism, mode) for mode in modes]
-    task, _ = asked_tasks(request, model, mechanism, find_path(model, path), chosen)
+    task, _ = requested_tasks(request, model, mechanism, find_path(model, path), chosen)
     run = own_method(request, options, controllers) or partial(simulate, options=options, warning=False)
     for mode in modes:
         yield run(task, mode)

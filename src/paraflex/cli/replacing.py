@@ -48,7 +48,7 @@ def hold_results(out: str | Path, kind: str, *, force: bool, field: str = "--out
         The folder cannot be held: see `hold_folder`.
     """
     with hold_folder(Path(out), kind, force=force, field=field) as folder:
-        say_replaced(folder.path)
+        print_replaced(folder.path)
         yield folder
 
 
@@ -63,15 +63,17 @@ def refuse_existing(output: Path, force: bool) -> None:
     )
 
 
-def say_replaced(folder: Path) -> None:
+def print_replaced(folder: Path) -> None:
     """Report on stderr which results in a folder a command will replace, and which files it leaves."""
     kind, foreign = kind_of_folder(folder), foreign_files(folder)
-    said = []
+    lines = []
     if kind:
-        said.append(f"{folder} holds {_described(folder, kind)}; it will be replaced (--out another folder keeps both)")
+        lines.append(
+            f"{folder} holds {_described(folder, kind)}; it will be replaced (--out another folder keeps both)"
+        )
     if foreign:
-        said.append(f"{folder} holds files not written by paraflex, which stay: {few(foreign, _NAMED)}")
-    for line in said:
+        lines.append(f"{folder} holds files not written by paraflex, which stay: {few(foreign, _NAMED)}")
+    for line in lines:
         plain_console(stderr=True).print(line, soft_wrap=True)
 
 

@@ -18,10 +18,10 @@ from paraflex.files.overlay import value_of
 from paraflex.kinematics import Path as EndEffectorPath
 from paraflex.mechanism import ActuationMode, Mechanism
 from paraflex.tracking import TrackingTask
-from paraflex.validity import to_blame
+from paraflex.validity import likely_cause
 
 
-def asked_model(choice: ModelChoice) -> Model:
+def requested_model(choice: ModelChoice) -> Model:
     """Load the requested model, with the values of --set."""
     found = {}
     for text in choice.settings:
@@ -34,7 +34,7 @@ def asked_model(choice: ModelChoice) -> Model:
     return load(choice.name, set=found)
 
 
-def asked_of(model: Model, run: Mapping[str, Any]) -> dict[str, Any]:
+def command_provenance(model: Model, run: Mapping[str, Any]) -> dict[str, Any]:
     """Return the provenance of a command: parameters of the model, its file, --set and the settings of the run."""
     source = {"mechanism": model.source, "set": dict(model.settings)}
     if may_be_outside():
@@ -82,7 +82,7 @@ def find_modes(model: Model, names: list[str]) -> list[ActuationMode]:
 
 def acting_controllers(model: Model, request: RunRequest) -> tuple[ControllerDescription, ...]:
     """Return the requested controllers, or the study's."""
-    with blaming(model):
+    with locating_errors(model):
         found = model.acting(request.controllers)
     if found and request.ked:
         raise InputError(
@@ -98,7 +98,7 @@ def acting_controllers(model: Model, request: RunRequest) -> tuple[ControllerDes
     return found
 
 
-def controllers_said(model: Model, acting: Sequence[ControllerDescription]) -> list[str]:
+def controller_arguments(model: Model, acting: Sequence[ControllerDescription]) -> list[str]:
     """Return the controllers of a run as values of --controller."""
     return [one.name for one in acting] or ([NONE] if model.study.controllers else [])
 
@@ -117,7 +117,7 @@ def plan_study(
     after: str | None = None,
 ) -> TrackingTask:
     """Plan the study along a path; errors name the option or field at fault."""
-    with blaming(model):
+    with locating_errors(model):
         try:
             return model.plan(path, mechanism=mechanism, **asdict(chosen), after=after, warning=False)
         except UnreachablePathError as error:
@@ -125,24 +125,24 @@ def plan_study(
 
 
 @contextmanager
-def blaming(model: Model) -> Iterator[None]:
+def locating_errors(model: Model) -> Iterator[None]:
     """Convert input and assembly errors within the context to errors that name the option or file at fault."""
     try:
         yield
     except AssemblyError as error:
         raise of_assembly(error, model) from error
     except InputError as error:
-        raise at_fault(error, model) from error.__cause__
+        raise located_error(error, model) from error.__cause__
 
 
 def of_assembly(error: AssemblyError, model: Model) -> InputError:
     """Return the error of a mechanism that cannot be assembled, naming the model's file."""
     # Links that are far too soft bend, instead of moving, when the loops are closed.
-    remedy = to_blame(model.mechanism) or error.remedy
+    remedy = likely_cause(model.mechanism) or error.remedy
     return InputError(error.problem, field="assembly", remedy=remedy, source=model.source)
 
 
-def at_fault(error: InputError, model: Model) -> InputError:
+def located_error(error: InputError, model: Model) -> InputError:
     """Return the same error, naming the option it came from or else the model's file."""
     flags = {
         "duration": "--duration",

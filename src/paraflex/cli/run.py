@@ -13,7 +13,7 @@ from paraflex.cli.commands.runs import RunRequest
 from paraflex.cli.integration import check_stops, given_flags, integration_options, integration_parameters
 from paraflex.cli.motion import run_motion
 from paraflex.cli.replacing import hold_results
-from paraflex.cli.request import asked_model, find_modes, find_paths, with_frames
+from paraflex.cli.request import find_modes, find_paths, requested_model, with_frames
 from paraflex.errors import InputError
 from paraflex.files import Model
 from paraflex.folders import RUN
@@ -23,7 +23,7 @@ from paraflex.writing import portable_name
 
 def run_command(request: RunRequest) -> int:
     """Run a study and write its results; return the exit code."""
-    model = asked_model(request.model)
+    model = requested_model(request.model)
     _check_fidelity(request)
     options = integration_options(request, model.study)
     how = {} if request.ked else integration_parameters(options, request.stop_at)
@@ -38,7 +38,7 @@ def run_command(request: RunRequest) -> int:
             name: (paths[name], held.enter_context(hold_results(folder, RUN, force=request.force)))
             for name, folder in _folders(paths, Path(request.out)).items()
         }
-        return run_along(request, model, asked_mechanism(model, request), followed, modes, options, how)
+        return run_along(request, model, requested_mechanism(model, request), followed, modes, options, how)
 
 
 def _folders(paths: Iterable[str], out: Path) -> dict[str, Path]:
@@ -60,7 +60,7 @@ def _folders(paths: Iterable[str], out: Path) -> dict[str, Path]:
 def _without_path(model: Model, request: RunRequest) -> Mechanism:
     if request.ked:
         raise InputError("the model has no path to prescribe", field="--ked", remedy="add a [path.NAME] table")
-    mechanism = asked_mechanism(model, request)
+    mechanism = requested_mechanism(model, request)
     if request.segments is None:
         return mechanism
     if model.start is not None:
@@ -79,14 +79,16 @@ def _check_fidelity(request: RunRequest) -> None:
         "--ked": request.ked,
         "--geometry": request.geometry is not None,
     }
-    asked = [flag for flag, given in chosen.items() if given]
-    if len(asked) > 1:
-        raise InputError("cannot be combined", field=asked[0], value=" ".join(asked), remedy="choose one of them")
-    if request.reduced and any(flag != "--geometry" for flag in asked):
-        raise conflict(f"has no effect with {asked[0]}", "--reduced", request.reduced)
+    requested = [flag for flag, given in chosen.items() if given]
+    if len(requested) > 1:
+        raise InputError(
+            "cannot be combined", field=requested[0], value=" ".join(requested), remedy="choose one of them"
+        )
+    if request.reduced and any(flag != "--geometry" for flag in requested):
+        raise conflict(f"has no effect with {requested[0]}", "--reduced", request.reduced)
     for name, given in asdict(request.frames).items():
         if given is not None and (request.rigid or request.segments is not None):
-            raise conflict(f"has no effect with {asked[0]}", f"--{name}", given)
+            raise conflict(f"has no effect with {requested[0]}", f"--{name}", given)
     if request.segments is not None and request.segments < 1:
         raise InputError("must be positive", field="--segments", value=request.segments, remedy="give 8")
     for flag, value in given_flags(request).items():
@@ -95,7 +97,7 @@ def _check_fidelity(request: RunRequest) -> None:
             raise InputError("has no effect with --ked", field=flag, value=value, remedy=remedy)
 
 
-def asked_mechanism(model: Model, request: RunRequest) -> Mechanism:
+def requested_mechanism(model: Model, request: RunRequest) -> Mechanism:
     """Return the mechanism at the requested fidelity."""
     mechanism = model.mechanism.rigid() if request.rigid else model.mechanism
     mechanism = with_frames(mechanism, request.frames)

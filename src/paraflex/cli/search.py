@@ -12,7 +12,7 @@ from paraflex.campaign import Progress
 from paraflex.cli import signals
 from paraflex.cli.bars import bars
 from paraflex.cli.commands.studies import SearchRequest
-from paraflex.cli.ending import exit_code, tell
+from paraflex.cli.ending import exit_code, print_results
 from paraflex.cli.tables import plain_console, print_table
 from paraflex.compilation import compile_kernels_for
 from paraflex.figures.search import tables
@@ -39,10 +39,10 @@ def search_command(request: SearchRequest, study: DesignStudy[R], report: Report
         for table in tables(numbers, result.units):
             print_table(out, table)
         report(out, result)
-        _say_end(console, result, request.folder)
+        _print_ending(console, result, request.folder)
 
     more = {"folder": str(result.folder), "fresh": result.fresh, "verdict": verdict.to_dict()}
-    tell(numbers | more, show, as_json=request.json, doubts=verdict)
+    print_results(numbers | more, show, as_json=request.json, findings=verdict)
     if not result.interrupted:
         save_figures(numbers, request.folder / "figures")
     return exit_code(bool(result.values), interrupted=result.interrupted)
@@ -52,14 +52,14 @@ def _with_bar(console: Console, study: DesignStudy[R], request: SearchRequest, w
     with bars(console, "{task.completed} designs, at most {task.total}", "{task.fields[best]}") as progress:
         bar = progress.add_task(study.name, total=study.search.evaluations, best="")
 
-        def tell(at: Progress) -> None:
+        def show_progress(at: Progress) -> None:
             best = "" if at.best is None else f"{what} {number(at.best)}"
             progress.update(bar, completed=at.done, best=best)
 
-        return study.run(request.folder, workers=request.workers.chosen, on_progress=tell)
+        return study.run(request.folder, workers=request.workers.chosen, on_progress=show_progress)
 
 
-def _say_end(console: Console, result: OptimisationResult | IdentificationResult, folder: Path) -> None:
+def _print_ending(console: Console, result: OptimisationResult | IdentificationResult, folder: Path) -> None:
     out = plain_console()
     failed = f", {result.failed} of them failed" if result.failed else ""
     out.print(f"{result.evaluations} designs{failed}; {result.stopped}")

@@ -8,7 +8,7 @@ from rich.console import Console
 
 from paraflex.cli import COMPLETE
 from paraflex.cli.commands.studies import SensitivityRequest
-from paraflex.cli.ending import tell
+from paraflex.cli.ending import print_results
 from paraflex.cli.replacing import hold_results
 from paraflex.cli.tables import print_table
 from paraflex.cli.writing import write_drawn
@@ -43,7 +43,7 @@ def sensitivity_command(request: SensitivityRequest) -> int:
                         print_table(out, table)
             out.print(f"{folder / found.values_file}, {TABLE}, {LINES} and {FIGURES}/", soft_wrap=True)
 
-        tell(summary, show, as_json=request.json)
+        print_results(summary, show, as_json=request.json)
         write_drawn(summary, held)
     return COMPLETE
 

@@ -47,7 +47,7 @@ def is_taken() -> bool:
 def leave_when_signalled() -> None:
     """Make signals end the process at once from now on, with a line and their exit code."""
     for number in _answered():
-        signal.signal(number, _leave)
+        signal.signal(number, _end_process)
 
 
 @contextmanager
@@ -60,7 +60,7 @@ def raised() -> Iterator[None]:
     before = {number: signal.signal(number, _raise) for number in _answered()}
     hooks = sys.unraisablehook, sys.excepthook
     # Compiled libraries pass exceptions that they cannot raise to these hooks, which print them by default.
-    sys.unraisablehook, sys.excepthook = _raise_again, _print_others
+    sys.unraisablehook, sys.excepthook = _reraise, _print_others
     try:
         yield
     finally:
@@ -74,7 +74,7 @@ def _answered() -> list[signal.Signals]:
     return [number for number in ENDING if signal.getsignal(number) not in (signal.SIG_IGN, None)]
 
 
-def _leave(number: int, _: FrameType | None) -> None:
+def _end_process(number: int, _: FrameType | None) -> None:
     with suppress(OSError):
         os.write(2, b"interrupted\n")
     os._exit(128 + (_Taken.number or number))
@@ -85,7 +85,7 @@ def _raise(number: int, frame: FrameType | None) -> None:
     if _Taken.number is None:
         _Taken.number, _Taken.first, _Taken.raised = number, now, 0.0
     if now - _Taken.first < _IMPORTS and _is_importing(frame):
-        _send_later(number)
+        _resend_later(number)
     elif now - _Taken.raised > _ONCE:
         _Taken.raised = now
         raise KeyboardInterrupt
@@ -99,7 +99,7 @@ def _is_importing(frame: FrameType | None) -> bool:
     return False
 
 
-def _raise_again(lost: Any) -> None:
+def _reraise(lost: Any) -> None:
     """Raise an interrupt again that was lost in a callback of a library, where exceptions cannot be raised.
 
     After an interrupt, errors in the deletion of incomplete objects are not printed.
@@ -108,7 +108,7 @@ def _raise_again(lost: Any) -> None:
         sys.__unraisablehook__(lost)
     elif issubclass(lost.exc_type, KeyboardInterrupt):
         _Taken.raised = 0.0
-        _send_later(_Taken.number)
+        _resend_later(_Taken.number)
 
 
 def _print_others(kind: type[BaseException], error: BaseException, trace: TracebackType | None) -> None:
@@ -116,7 +116,7 @@ def _print_others(kind: type[BaseException], error: BaseException, trace: Traceb
         sys.__excepthook__(kind, error, trace)
 
 
-def _send_later(number: int) -> None:
+def _resend_later(number: int) -> None:
     timer = threading.Timer(_AGAIN, _send, [number])
     timer.daemon = True
     timer.start()

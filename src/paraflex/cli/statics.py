@@ -7,14 +7,14 @@ from typing import Any
 
 import xarray as xr
 
-from paraflex.cli import COMPLETE, TROUBLE
+from paraflex.cli import COMPLETE, FAILURE
 from paraflex.cli.commands.models import StaticsRequest
 from paraflex.cli.commands.requests import flagged
 from paraflex.cli.dataset_command import DatasetCommand
-from paraflex.cli.request import asked_model, asked_of, of_assembly
+from paraflex.cli.request import command_provenance, of_assembly, requested_model
 from paraflex.cli.statics_tables import print_statics
 from paraflex.equilibria import Statics, StaticsDefaults, statics
-from paraflex.equilibria.given import coordinate_named
+from paraflex.equilibria.conditions import coordinate_named
 from paraflex.errors import AssemblyError, EquilibriumError, InputError, renamed
 from paraflex.files import Model
 from paraflex.files.fields import number_in
@@ -25,25 +25,25 @@ _NONE = "none"
 
 def statics_command(request: StaticsRequest) -> int:
     """Compute the equilibria, print them and, with --out, write files; return the exit code."""
-    model = asked_model(request.model)
+    model = requested_model(request.model)
     data = _COMMAND.run(request.files, lambda: _data(model, request))
-    return COMPLETE if data["status"].item() == "complete" else TROUBLE
+    return COMPLETE if data["status"].item() == "complete" else FAILURE
 
 
 _COMMAND = DatasetCommand("statics", statics_summary, print_statics)
 
 
 def _data(model: Model, request: StaticsRequest) -> xr.Dataset:
-    asked = _asked(model, request)
-    return statics_dataset(_found(model, asked, request), parameters=_parameters(model, asked, request))
+    requested = _requested(model, request)
+    return statics_dataset(_found(model, requested, request), parameters=_parameters(model, requested, request))
 
 
-def _found(model: Model, asked: StaticsDefaults, request: StaticsRequest) -> Statics:
+def _found(model: Model, requested: StaticsDefaults, request: StaticsRequest) -> Statics:
     """Return the equilibria, or those before the first that is not found."""
     with flagged(request, first=True):
         try:
             return statics(
-                model, **vars(asked), warning=False,
+                model, **vars(requested), warning=False,
                 assembly=request.assembly or (None if model.start is not None else model.study.assembly),
             )  # fmt: skip
         except EquilibriumError as error:
@@ -54,7 +54,7 @@ def _found(model: Model, asked: StaticsDefaults, request: StaticsRequest) -> Sta
             raise of_assembly(error, model) from error
 
 
-def _asked(model: Model, request: StaticsRequest) -> StaticsDefaults:
+def _requested(model: Model, request: StaticsRequest) -> StaticsDefaults:
     """Return the arguments of `statics`: loads, torques and travel of the options if any is given, else the model's.
 
     All other arguments that are not given are the model's as well.
@@ -72,15 +72,15 @@ def _asked(model: Model, request: StaticsRequest) -> StaticsDefaults:
             for name, text in _pairs(request.torques, "--torque").items()
         }
         held = () if request.held == [_NONE] else request.held
-        asked = model.statics.filled(
+        requested = model.statics.filled(
             loads=loads or None, torques=torques or None, moved=moved or None, held=held, steps=request.steps,
             stiffness=request.stiffness, buckling=request.buckling,
         )  # fmt: skip
     effector = mechanism.end_effector
-    if asked.stiffness is not None or asked.loads or asked.torques or asked.moved or effector is None:
-        return asked
+    if requested.stiffness is not None or requested.loads or requested.torques or requested.moved or effector is None:
+        return requested
     # Without loads, torques or travel, the stiffness is that of the end-effector.
-    return asked.filled(stiffness=tuple(f"{effector.point}.{axis}" for axis in effector.coordinates))
+    return requested.filled(stiffness=tuple(f"{effector.point}.{axis}" for axis in effector.coordinates))
 
 
 def _pairs(given: Sequence[str], flag: str) -> dict[str, str]:
@@ -101,8 +101,8 @@ def _in_unit(text: str, unit: str, field: str) -> float:
         return number_in(text, unit)
 
 
-def _parameters(model: Model, asked: StaticsDefaults, request: StaticsRequest) -> dict[str, Any]:
+def _parameters(model: Model, requested: StaticsDefaults, request: StaticsRequest) -> dict[str, Any]:
     """Return the provenance of the equilibria."""
-    given = {name: value for name, value in (vars(asked) | {"assembly": request.assembly}).items()
+    given = {name: value for name, value in (vars(requested) | {"assembly": request.assembly}).items()
              if value is not None and value != {}}  # fmt: skip
-    return asked_of(model, {"statics": True} | given)
+    return command_provenance(model, {"statics": True} | given)

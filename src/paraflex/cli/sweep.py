@@ -10,7 +10,7 @@ from rich.console import Console
 from paraflex.campaign import Progress
 from paraflex.cli.bars import bars
 from paraflex.cli.commands.studies import SweepRequest
-from paraflex.cli.ending import exit_code, tell
+from paraflex.cli.ending import exit_code, print_results
 from paraflex.cli.tables import plain_console
 from paraflex.compilation import compile_kernels_for
 from paraflex.designs.measure import beyond_limits, coarse_runs
@@ -33,7 +33,7 @@ def sweep_command(request: SweepRequest) -> int:
     figures = {"folder": str(result.folder), "table": str(result.table), **result.to_dict()}
     session = {"fresh": result.fresh, "seconds": result.seconds, "interrupted": result.interrupted}
     more = session | {"part": parts, "verdict": verdict.to_dict()}
-    tell(figures | more, lambda _: _report(console, result), as_json=request.json, doubts=verdict)
+    print_results(figures | more, lambda _: _report(console, result), as_json=request.json, findings=verdict)
     if request.report and result.done:
         _write_report(console, folder, result)
     return exit_code(not result.done or bool(result.counts.get("complete")), interrupted=result.interrupted)

@@ -17,7 +17,7 @@ from paraflex.findings import DONE_STATUSES, Finding
 from paraflex.formatting import number as text_of, quantity
 
 if TYPE_CHECKING:
-    from paraflex.figures.tables import Table as Described
+    from paraflex.figures.tables import Table as DescribedInputs
 
     # Their import takes as long as all of `paraflex info`.
     from paraflex.studies import StudyResult
@@ -46,10 +46,10 @@ def plain_console(*, stderr: bool = False) -> Console:
 
 def warn_of(console: Console, findings: Iterable[Finding], whose: str = "") -> None:
     """Print a line for each finding, which begins with `whose`."""
-    from paraflex.results.doubts import doubt_lines  # imports xarray, which descriptions of mechanisms do not need
+    from paraflex.results.findings import finding_lines  # imports xarray, which descriptions of mechanisms do not need
 
     findings = list(findings)
-    for line in doubt_lines(findings):
+    for line in finding_lines(findings):
         console.print(f"{whose}{line}", soft_wrap=True)
     printed(findings)
 
@@ -133,7 +133,7 @@ def framed_table(title: str, headings: Iterable[str], right: Container[int] = ()
     return table
 
 
-def print_tables(console: Console, tables: Iterable[Described]) -> None:
+def print_tables(console: Console, tables: Iterable[DescribedInputs]) -> None:
     """Print tables that have rows below their titles, a title that several share only once."""
     title = None
     for shown in filter(None, tables):
@@ -141,7 +141,7 @@ def print_tables(console: Console, tables: Iterable[Described]) -> None:
         title = shown.title
 
 
-def print_table(console: Console, shown: Described, title: str | None = None) -> None:
+def print_table(console: Console, shown: DescribedInputs, title: str | None = None) -> None:
     """Print a described table below its title; nothing if it has no rows.
 
     Columns that do not fit the console continue in further tables, behind the columns of words that name the rows.

@@ -10,9 +10,17 @@ from rich.console import Console
 from paraflex.cli.bars import counting
 from paraflex.cli.commands.requests import flagged
 from paraflex.cli.commands.runs import VerifyRequest
-from paraflex.cli.ending import exit_code, say_where, tell
+from paraflex.cli.ending import exit_code, print_location, print_results
 from paraflex.cli.replacing import hold_results
-from paraflex.cli.request import asked_model, asked_of, find_mode, find_modes, find_path, plan_study, with_frames
+from paraflex.cli.request import (
+    command_provenance,
+    find_mode,
+    find_modes,
+    find_path,
+    plan_study,
+    requested_model,
+    with_frames,
+)
 from paraflex.cli.tables import plain_console, print_table
 from paraflex.cli.writing import write_drawn
 from paraflex.compilation import compile_kernels
@@ -29,7 +37,7 @@ from paraflex.studies import FIDELITIES, VerificationOptions, VerificationStudy,
 
 def verify_command(request: VerifyRequest) -> int:
     """Run all models and write their comparison; return the exit code."""
-    model = asked_model(request.model)
+    model = requested_model(request.model)
     path, path_name = find_path(model, request.path)
     modes = find_modes(model, request.modes) if request.modes else [find_mode(model, [])]
     _options(request)
@@ -56,9 +64,9 @@ def _verify(
             compile_kernels(geometry, console.print)
     began = time.perf_counter()
     task = plan_study(model, mechanism, path, path_name, request.plan)
-    asked = {"path": path_name, "modes": [mode.name for mode in modes]} | asdict(request.frames) | asdict(options)
-    asked |= {"method": options.method.name, "method_parameters": options.method.values}
-    study = VerificationStudy(task, modes, models, options, asked_of(model, asked), model.study.error)
+    requested = {"path": path_name, "modes": [mode.name for mode in modes]} | asdict(request.frames) | asdict(options)
+    requested |= {"method": options.method.name, "method_parameters": options.method.values}
+    study = VerificationStudy(task, modes, models, options, command_provenance(model, requested), model.study.error)
     with counting(console) as report:
         verification = study.run(on_progress=report)
     summary = verification.to_dict()
@@ -75,12 +83,12 @@ def _verify(
                           *link_tables(summary, mode)):  # fmt: skip
                 print_table(out, table)
 
-    tell(summary, show, as_json=request.json)
+    print_results(summary, show, as_json=request.json)
     try:
         if data is not None:
             write_drawn(data, folder, request.drawn)
             if not request.json:
-                say_where(began, "numbers", folder.path, request.drawn)
+                print_location(began, "numbers", folder.path, request.drawn)
     finally:
         for mode, by_model in verification.runs.items():
             for name, runs in by_model.items():

@@ -40,7 +40,7 @@ def write_drawn_run(data: xr.Dataset, folder: ResultsFolder, request: RunRequest
 def write_drawn(results: xr.Dataset | Mapping[str, Any], folder: ResultsFolder, drawn: DrawnChoice = _FIGURES) -> None:
     """Add figures, and the report of a dataset, to results already written, which an interruption leaves intact."""
     try:
-        with folder.amended() as new:
+        with folder.added_files() as new:
             if drawn.figures:
                 from paraflex.plots import save_figures  # its import takes a second
 

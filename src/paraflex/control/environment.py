@@ -249,7 +249,7 @@ class Environment(Env[Array, NDArray[Any]]):
             return self._terminated(error, action)
         self._seen = self._observe(self._step, readings, self.np_random)
         info = self._info(action)
-        reward = self._rewarded(readings, action, info)
+        reward = self._reward_of(readings, action, info)
         truncated = self._step == self._times.size - 1
         if truncated:
             self._step = None
@@ -263,7 +263,7 @@ class Environment(Env[Array, NDArray[Any]]):
         self._step = None
         return self._seen.copy(), -self._penalty * left, True, False, info
 
-    def _rewarded(self, readings: Mapping[str, float], action: Array, info: Mapping[str, Any]) -> float:
+    def _reward_of(self, readings: Mapping[str, float], action: Array, info: Mapping[str, Any]) -> float:
         if self._reward is not None:
             return float(self._reward(self.simulation, readings, action))
         cost = (info["deviation"] / self._accuracy) ** 2 + self._effort_weight * (action @ action)

@@ -78,12 +78,12 @@ class Observer:
         self.names: tuple[str, ...] = names
         if task is not None:
             now, *later = (_planned(task, mechanism, names, times + time) for time in (0.0, *ahead))
-            told = [k for k, name in enumerate(names) if name in now]
+            planned = [k for k, name in enumerate(names) if name in now]
             if errors:
-                self._planned[:, told] = np.stack(list(now.values()), axis=1) if now else 0.0
+                self._planned[:, planned] = np.stack(list(now.values()), axis=1) if now else 0.0
             changes = [each[name] - now[name] for each in later for name in now]
             self._changes = np.stack(changes, axis=1) if changes else self._changes
-            scale = np.concatenate([scale, *(scale[told] for _ in ahead)])
+            scale = np.concatenate([scale, *(scale[planned] for _ in ahead)])
             self.names = (*names, *(f"{name}+{time:g}" for time in ahead for name in now))
         self._scale = scale
 

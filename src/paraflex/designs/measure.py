@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from paraflex.equilibria.given import Conditions
+from paraflex.equilibria.conditions import Conditions
 from paraflex.equilibria.result import Statics
 from paraflex.errors import InputError, IntegrationError, Moment, as_enum, suggestion
 from paraflex.integrators.between import COARSE
@@ -141,7 +141,7 @@ def metrics_of(
 def metric_columns(run: Runs, names: Sequence[str]) -> tuple[str, ...]:
     """Return the columns of metrics: NAME, or NAME.MEMBER for those of each motor, joint or other member."""
     if isinstance(run, Statics):
-        members = members_of(run.system.described, run.equations.given)
+        members = members_of(run.system.described, run.equations.conditions)
     else:
         members = members_of(run.system.described if isinstance(run, MotionRun) else run.task.mechanism)
     return tuple(column for name in names for column in METRICS[name].columns(members))

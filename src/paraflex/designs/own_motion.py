@@ -29,7 +29,7 @@ class OwnMotion:
         Duration [s].
     samples : int
         Number of samples.
-    torques : mapping of str to float or AngleLaw
+    torques : mapping of str to float or TimeProfile
         Torque [N m] or force [N] of each motor by name, constant or over time.
     controllers : sequence of ControllerDescription
         Sampled controllers, which replace the torques; none by default.

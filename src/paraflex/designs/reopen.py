@@ -12,7 +12,7 @@ import xarray as xr
 from paraflex.campaign import STUDY, read_study
 from paraflex.designs.measure import measure
 from paraflex.designs.run import Task, dataset_of, ready, run_mode
-from paraflex.designs.samples import Varied
+from paraflex.designs.samples import SweptParameter
 from paraflex.designs.setting import Setting, digest, versions
 from paraflex.errors import InputError
 
@@ -56,7 +56,7 @@ class StudyFolder:
 
 
 def study_account(
-    name: str, setting: Setting, parameters: Sequence[Varied], content: Mapping[str, Any], **more: Any
+    name: str, setting: Setting, parameters: Sequence[SweptParameter], content: Mapping[str, Any], **more: Any
 ) -> dict[str, Any]:
     """Return the contents of the `study.json` of a folder.
 
@@ -66,7 +66,7 @@ def study_account(
         Name of the study.
     setting : Setting
         Common settings of all runs.
-    parameters : sequence of Varied
+    parameters : sequence of SweptParameter
         Parameters of the study.
     content : mapping
         All inputs that determine the results, as plain values.
@@ -101,7 +101,7 @@ def open_study(folder: str | Path) -> StudyFolder:
         raise InputError("not a study.json of paraflex", field=str(folder / STUDY), remedy=_AGAIN) from error
 
 
-def run_again(
+def rerun(
     setting: Setting,
     values: Sequence[float],
     path: str,
@@ -133,7 +133,7 @@ def run_again(
     return dataset_of(run, options), measure(run, setting.metrics)
 
 
-def _range(parameter: Varied) -> list[Any]:
+def _range(parameter: SweptParameter) -> list[Any]:
     """Return the lowest and highest value of a parameter, and "log", "linear" or "values"."""
     if parameter.values is not None:
         return [min(parameter.values), max(parameter.values), "values"]

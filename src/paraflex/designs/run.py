@@ -22,7 +22,7 @@ from paraflex.files import Model
 from paraflex.integrators import IntegrationOptions
 from paraflex.mechanism import Geometry, Mechanism
 from paraflex.motion import MotionRun
-from paraflex.reduction import reduced_mechanism
+from paraflex.reduced_bodies import reduced_mechanism
 from paraflex.results import motion_dataset, statics_dataset, tracking_dataset
 from paraflex.results.metrics import METRICS, Members
 from paraflex.tracking import TrackingTask, simulate
@@ -35,7 +35,7 @@ STATUSES = (STATUS_COMPLETE, STATUS_FAILED, STATUS_INVALID)
 _ID_DIGITS = 16
 
 
-class UnderControl(NamedTuple):
+class ControlledTask(NamedTuple):
     """Planned motion, and the controllers that act in addition to its torques."""
 
     task: TrackingTask
@@ -43,12 +43,12 @@ class UnderControl(NamedTuple):
 
 
 # Inputs ready for `run_mode`.
-Planned = TrackingTask | UnderControl | OwnMotion | OwnStatics
+Planned = TrackingTask | ControlledTask | OwnMotion | OwnStatics
 
 
-def under_control(task: TrackingTask, controllers: Sequence[ControllerDescription]) -> TrackingTask | UnderControl:
+def under_control(task: TrackingTask, controllers: Sequence[ControllerDescription]) -> TrackingTask | ControlledTask:
     """Combine a planned motion with controllers; return the motion itself if there are none."""
-    return UnderControl(task, tuple(controllers)) if controllers else task
+    return ControlledTask(task, tuple(controllers)) if controllers else task
 
 
 class Task(NamedTuple):
@@ -104,10 +104,10 @@ def run_task(setting: Setting, task: Task, watch: Callable[[float], None] | None
     Abandoned
         The task was abandoned by `watch`.
     """
-    for name, wanted in setting.versions.items():
-        if versions()[name] != wanted:
+    for name, version in setting.versions.items():
+        if versions()[name] != version:
             raise InputError(
-                f"a worker has {name} {versions()[name]}, the sweep was begun with {wanted}", field="--cluster",
+                f"a worker has {name} {versions()[name]}, the sweep was begun with {version}", field="--cluster",
                 remedy="give workers the same installation: results must not depend on the worker",
             )  # fmt: skip
     rows, kept = [_blank(setting, task, mode) for mode in setting.modes], {}
@@ -115,7 +115,7 @@ def run_task(setting: Setting, task: Task, watch: Callable[[float], None] | None
         planned, options = ready(setting, task)
     except Exception as error:
         for row in rows:
-            row |= trouble(error)
+            row |= error_row(error)
         return Outcome(task, rows)
     for row in rows:
         measured, run = measured_mode(planned, row["mode"], options, setting.metrics, watch)
@@ -189,7 +189,7 @@ def table_schema(setting: Setting, members: Members) -> pa.Schema:
     return pa.schema(fields)
 
 
-def trouble(error: Exception) -> Row:
+def error_row(error: Exception) -> Row:
     """Return status, reason and time reached of a run that an error ended."""
     if isinstance(error, InputError):
         return {"status": STATUS_INVALID, "reason": str(error)}
@@ -247,7 +247,7 @@ def run_mode(planned: Planned, mode: str, options: IntegrationOptions, watch: Ca
         return planned.found()
     if isinstance(planned, OwnMotion):
         run = planned.simulate(options, watch)
-    elif isinstance(planned, UnderControl):
+    elif isinstance(planned, ControlledTask):
         run = simulate_controlled(planned.task, mode, planned.controllers, options=options, on_progress=watch)
     else:
         run = simulate(planned, mode, options=options, on_progress=watch, warning=False)
@@ -283,7 +283,7 @@ def measured_mode(
         raise
     # An unexpected error of one design is recorded in its row and does not end the sweep.
     except Exception as error:
-        return trouble(error), None
+        return error_row(error), None
     return row, run
 
 

@@ -17,7 +17,7 @@ KINDS = GRID, LIST, RANDOM, SOBOL = "grid", "list", "random", "sobol"
 
 
 @dataclass(frozen=True)
-class Varied:
+class SweptParameter:
     """Parameter of a sweep.
 
     Attributes
@@ -73,7 +73,7 @@ class Varied:
         return self.spread(np.linspace(0.0, 1.0, self.number))
 
 
-def check_varied(parameter: Varied, kind: str) -> None:
+def check_varied(parameter: SweptParameter, kind: str) -> None:
     """Check that a parameter has the fields that a kind of sampling needs.
 
     Raises
@@ -115,12 +115,12 @@ def check_varied(parameter: Varied, kind: str) -> None:
         )
 
 
-def designs(parameters: Sequence[Varied], kind: str, number: int | None, seed: int) -> Array:
+def designs(parameters: Sequence[SweptParameter], kind: str, number: int | None, seed: int) -> Array:
     """Return all designs (designs, parameters).
 
     Parameters
     ----------
-    parameters : sequence of Varied
+    parameters : sequence of SweptParameter
         Parameters, checked by `check_varied`. Without parameters there is one design, the mechanism as it is.
     kind : str
         Kind of sampling: "grid" (all combinations, the last parameter fastest), "list" (the first values of all
@@ -175,7 +175,7 @@ def _between(low: float, high: float, fraction: Array) -> Array:
     return (1.0 - fraction) * low + fraction * high
 
 
-def _check_range(parameter: Varied, where: str) -> None:
+def _check_range(parameter: SweptParameter, where: str) -> None:
     low, high = parameter.ends
     if high < low:
         raise InputError(f"below low, {low:g}", field=f"{where}.high", value=high, remedy="exchange the two")
@@ -189,7 +189,7 @@ def _check_range(parameter: Varied, where: str) -> None:
         )  # fmt: skip
 
 
-def _check_number(parameters: Sequence[Varied], kind: str, number: int | None, seed: int) -> None:
+def _check_number(parameters: Sequence[SweptParameter], kind: str, number: int | None, seed: int) -> None:
     if seed < 0:
         raise InputError("must not be negative", field="sampling.seed", value=seed, remedy="give 0")
     if kind in (RANDOM, SOBOL):

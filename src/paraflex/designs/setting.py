@@ -14,10 +14,10 @@ from typing import Any
 from paraflex.designs.measure import metrics_of
 from paraflex.designs.own_motion import own_duration
 from paraflex.designs.own_statics import check_of_statics
-from paraflex.designs.samples import Varied
+from paraflex.designs.samples import SweptParameter
 from paraflex.designs.schema import SweepTable, VaryTable
 from paraflex.designs.units import check_unit_of, unit_of
-from paraflex.equilibria.given import chosen_over
+from paraflex.equilibria.conditions import chosen_over
 from paraflex.errors import InputError, suggestion
 from paraflex.files import Model, library_names, model_from
 from paraflex.files.expressions import ExpressionError, evaluate
@@ -31,9 +31,9 @@ from paraflex.integrators import IntegrationOptions, check_times
 from paraflex.limits import WHOLE, at_most, of_size
 from paraflex.mechanism.quantities import known
 from paraflex.results.dataset import part_of
-from paraflex.results.following import Part
+from paraflex.results.following import PathPart
 from paraflex.results.metrics import METRICS, MOTION, PATH, STATICS, Members, metric_unit
-from paraflex.validity import doubtful_numbers
+from paraflex.validity import implausible_numbers
 
 # Default limit of attempted steps, so that a single design with violent motion does not delay a study.
 DESIGN_MOST_STEPS = 200_000
@@ -114,9 +114,9 @@ class Setting:
     @cached_property
     def identity(self) -> str:
         """Digest of the common settings of all runs, part of their ids."""
-        asked = [self.duration, self.samples, self.assembly, dict(self.integration), dict(self.versions)]
+        settings = [self.duration, self.samples, self.assembly, dict(self.integration), dict(self.versions)]
         more = [name for name in ("balanced", "statics") if getattr(self, name)]
-        return digest([dict(self.data), *asked, *more])
+        return digest([dict(self.data), *settings, *more])
 
     @property
     def parameter_units(self) -> dict[str, str]:
@@ -152,7 +152,7 @@ class Setting:
         model = model_from(overlaid(dict(self.data), inside), self.source, self.text)
         return model, self.options(model, chosen)
 
-    def parts(self) -> dict[str, Part]:
+    def parts(self) -> dict[str, PathPart]:
         """Return the covered part of each path that runs do not complete, for the design that the file describes."""
         model = model_from(dict(self.data), self.source)
         found = {}
@@ -166,7 +166,7 @@ class Setting:
         model = model_from(dict(self.data), self.source)
         parts = [part.finding(f"path.{name}") for name, part in self.parts().items()]
         duration = None if self.has_path or self.statics else own_duration(model, self.duration)
-        return Verdict([*doubtful_numbers(model.mechanism, duration), *parts])
+        return Verdict([*implausible_numbers(model.mechanism, duration), *parts])
 
     def options(self, model: Model, chosen: Mapping[str, float] | None = None) -> IntegrationOptions:
         """Return the integration options of a design: its own, else those of the study, else those of its file.
@@ -179,7 +179,7 @@ class Setting:
         return model.study.integration(dict(self.integration) | dict(chosen or {}))
 
 
-def make_setting(table: SweepTable, folder: FilePath) -> tuple[Setting, tuple[Varied, ...], Model]:
+def make_setting(table: SweepTable, folder: FilePath) -> tuple[Setting, tuple[SweptParameter, ...], Model]:
     """Return the common settings of a study, its parameters, and the mechanism's model as in its file.
 
     Raises
@@ -236,16 +236,16 @@ def digest(content: Any) -> str:
     return hashlib.sha256(json.dumps(content, sort_keys=True, default=str).encode()).hexdigest()
 
 
-def _with_statics(model: Model, said: Mapping[str, Any]) -> Model:
+def _with_statics(model: Model, changes: Mapping[str, Any]) -> Model:
     """Return the model with its [statics] table, if any, overridden by that of the study."""
-    data = dict(model.parameters) | {"statics": chosen_over(model.parameters.get("statics", {}), said)}
+    data = dict(model.parameters) | {"statics": chosen_over(model.parameters.get("statics", {}), changes)}
     try:
         return replace(model_from(data, model.source, model.text), settings=model.settings)
     except InputError as error:
         raise error.in_file("") from None
 
 
-def _varied(name: str, entry: VaryTable, data: Mapping[str, Any]) -> Varied:
+def _varied(name: str, entry: VaryTable, data: Mapping[str, Any]) -> SweptParameter:
     fields = tuple(entry.fields) or (name,)
     for place in _places(data, name, fields):
         for key in ("low", "high", "start"):
@@ -260,7 +260,7 @@ def _varied(name: str, entry: VaryTable, data: Mapping[str, Any]) -> Varied:
         )
     for value in (*(values or ()), entry.low or 0.0, entry.high or 0.0) if whole else ():
         at_most(abs(value), WHOLE, f"vary.{name}", "too large for a whole number")
-    return Varied(
+    return SweptParameter(
         name=name,
         fields=fields,
         values=None if values is None else tuple(map(float, values)),
@@ -365,7 +365,7 @@ def _check(setting: Setting, model: Model) -> None:
     model.mechanism.assembly(setting.assembly)
 
 
-def _check_columns(parameters: tuple[Varied, ...]) -> None:
+def _check_columns(parameters: tuple[SweptParameter, ...]) -> None:
     # The columns of a metric of members are NAME.MEMBER, so a parameter may have the name of such a metric.
     taken = {*FIXED_COLUMNS, *(metric.name for metric in METRICS.values() if not metric.each)}
     for parameter in parameters:

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from paraflex.arguments import checked_arguments, given_as
+from paraflex.arguments import checked_arguments, named_in_errors
 from paraflex.arrays import Array
 from paraflex.campaign import (
     TRAJECTORIES,
@@ -35,10 +35,10 @@ from paraflex.compilation import compile_kernels_for
 from paraflex.designs.measure import members_of
 from paraflex.designs.reopen import study_account
 from paraflex.designs.run import STATUS_COMPLETE, Outcome, Task, is_row_of, lost, run_id, run_task, table_schema
-from paraflex.designs.samples import Varied, check_varied, designs
+from paraflex.designs.samples import SweptParameter, check_varied, designs
 from paraflex.designs.schema import SweepTable, study_table
 from paraflex.designs.setting import Setting, make_setting
-from paraflex.equilibria.given import conditions
+from paraflex.equilibria.conditions import conditions
 from paraflex.errors import InputError
 from paraflex.files import Model, model_from
 from paraflex.folders import check_inside
@@ -126,7 +126,7 @@ class SweptResult(KeptResult):
         return self.sweep.complete
 
 
-@given_as("a sweep", "a SweepStudy")
+@named_in_errors("a sweep", "a SweepStudy")
 @dataclass(frozen=True)
 class SweepStudy(Study["SweepResult"]):
     """Parameter sweep of a mechanism: its settings, parameters and designs.
@@ -137,7 +137,7 @@ class SweepStudy(Study["SweepResult"]):
         Name of the study.
     setting : Setting
         Common settings of all runs.
-    parameters : tuple of Varied
+    parameters : tuple of SweptParameter
         Parameters.
     kind : str
         Kind of sampling.
@@ -149,7 +149,7 @@ class SweepStudy(Study["SweepResult"]):
 
     name: str
     setting: Setting
-    parameters: tuple[Varied, ...]
+    parameters: tuple[SweptParameter, ...]
     kind: str
     designs: Array
     members: Members

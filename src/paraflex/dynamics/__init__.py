@@ -1,13 +1,13 @@
 """Equations of motion of a mechanism: its system of constant arrays, consistent states, equilibria, linearisation."""
 
-from paraflex.dynamics.brake import Braked as Braked, brake as brake
+from paraflex.dynamics.brake import BrakedSystem as BrakedSystem, brake as brake
 from paraflex.dynamics.coordinates import (
     BodyCoordinates as BodyCoordinates,
     Marker as Marker,
     end_markers as end_markers,
     node_marker as node_marker,
 )
-from paraflex.dynamics.drive import Reach as Reach, reach as reach
+from paraflex.dynamics.drive import DrivenFreedoms as DrivenFreedoms, driven_freedoms as driven_freedoms
 from paraflex.dynamics.equilibrium import static_equilibrium as static_equilibrium
 from paraflex.dynamics.inputs import Inputs as Inputs, inputs_of as inputs_of
 from paraflex.dynamics.joint_coordinates import (
@@ -18,6 +18,10 @@ from paraflex.dynamics.joint_coordinates import (
     place_along_beam as place_along_beam,
 )
 from paraflex.dynamics.linearise import Vibration as Vibration, natural_frequencies as natural_frequencies
+from paraflex.dynamics.modal_truncation import (
+    MissingRotation as MissingRotation,
+    missing_rotations as missing_rotations,
+)
 from paraflex.dynamics.numbers import numbers_of as numbers_of, same_layout as same_layout, with_numbers as with_numbers
 from paraflex.dynamics.packing import records as records
 from paraflex.dynamics.points import across_chord as across_chord
@@ -27,7 +31,6 @@ from paraflex.dynamics.quasi_static import (
     joint_motions as joint_motions,
 )
 from paraflex.dynamics.rank import Dependence as Dependence, dependence as dependence, redundant_rows as redundant_rows
-from paraflex.dynamics.reduction import MissedTurn as MissedTurn, missed_turns as missed_turns
 from paraflex.dynamics.sensors import (
     SensorRows as SensorRows,
     sensor_readings as sensor_readings,
@@ -37,10 +40,10 @@ from paraflex.dynamics.signals import (
     InputSignals as InputSignals,
     acting_loads as acting_loads,
     constant_signals as constant_signals,
-    law_signal as law_signal,
     moment_signals as moment_signals,
     pack_signals as pack_signals,
     piecewise_quintic as piecewise_quintic,
+    profile_signal as profile_signal,
     still_signals as still_signals,
 )
 from paraflex.dynamics.singularity import SingularityMeasure as SingularityMeasure

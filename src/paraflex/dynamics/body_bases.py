@@ -19,7 +19,7 @@ from paraflex.dynamics.held import held_modes, place_rows, slope_rows, static_sh
 from paraflex.errors import InputError
 from paraflex.fem import ModalBasis, modal_basis
 from paraflex.kernel.packed import ANGLE, POINT
-from paraflex.mechanism import AppliedTorque, Body, BodyReduction, FlexibleBeam, Mechanism, PointRef, RigidBody
+from paraflex.mechanism import AppliedTorque, Body, ComponentModes, FlexibleBeam, Mechanism, PointRef, RigidBody
 
 # A shape is dropped if its part independent of the others is below this fraction, by the root of its strain energy.
 _DEPENDENT = 1e-10
@@ -66,7 +66,7 @@ def _acting(mechanism: Mechanism, constraints: Sequence[Constraint]) -> Iterator
     for term in (term for constraint in constraints for term in constraint.terms):
         if term.carrier in ("frame", "track"):
             beam = None if term.a.on_ground else mechanism.body(term.a.body)
-            if isinstance(beam, FlexibleBeam) and beam.reduction is BodyReduction.CRAIG_BAMPTON:
+            if isinstance(beam, FlexibleBeam) and beam.reduction is ComponentModes.CRAIG_BAMPTON:
                 raise InputError(
                     "a joint slides along it, so that static shapes are not sufficient",
                     field=f"body.{beam.name}.reduction", value=beam.reduction.value,
@@ -138,7 +138,7 @@ def reduced_body(
     assert not isinstance(described, RigidBody)
     if name in mechanism.bases:
         shapes = _vibrations(body, _given(body, np.array(mechanism.bases[name])))
-    elif isinstance(described, FlexibleBeam) and described.reduction is BodyReduction.CRAIG_BAMPTON:
+    elif isinstance(described, FlexibleBeam) and described.reduction is ComponentModes.CRAIG_BAMPTON:
         rows = interface_rows(mechanism, bodies, constraints, name)
         held = held_modes(body, rows)[1][:, : described.modes]
         shapes = _vibrations(body, np.hstack([static_shapes(body, rows), held]))

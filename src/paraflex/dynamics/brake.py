@@ -12,11 +12,11 @@ from paraflex.dynamics.sparse import sparse_mass
 from paraflex.dynamics.state import State, project_velocity
 from paraflex.dynamics.system import System, build_system
 from paraflex.mechanism import PrescribedAngle
-from paraflex.mechanism.laws import HeldAngle
+from paraflex.mechanism.profiles import HeldAngle
 
 
 @dataclass(frozen=True)
-class Braked:
+class BrakedSystem:
     """A system whose brakes have engaged.
 
     Attributes
@@ -42,7 +42,7 @@ class Braked:
         return -multipliers[:, list(self.rows)]
 
 
-def brake(system: System, state: State, joints: Sequence[str]) -> Braked:
+def brake(system: System, state: State, joints: Sequence[str]) -> BrakedSystem:
     """Lock joints at a state by a plastic impact.
 
     The velocities after the impact are the nearest, in the mass metric, that the locked joints allow: v+ = v - M^-1 C^T
@@ -60,13 +60,13 @@ def brake(system: System, state: State, joints: Sequence[str]) -> Braked:
 
     Returns
     -------
-    Braked
+    BrakedSystem
         Locked system, its state after the impact, and the dissipated energy.
 
     Raises
     ------
     InconsistentConstraintsError
-        A joint is moved by a prescribed law.
+        A joint is moved by a prescribed motion.
     """
     mechanism = system.mechanism
     names = [f"brake of {joint}" for joint in joints]
@@ -80,4 +80,4 @@ def brake(system: System, state: State, joints: Sequence[str]) -> Braked:
     energy = 0.5 * float(lost @ (sparse_mass(system, state.q) @ lost))
     found = {row.rpartition(" ")[0]: i for i, row in enumerate(locked.rows)}
     rows = tuple(found[name] for name in names)
-    return Braked(locked, replace(state, v=v), energy, rows)
+    return BrakedSystem(locked, replace(state, v=v), energy, rows)

@@ -20,7 +20,7 @@ _SETS_TRIED, _SETS_KEPT = 20_000, 1000
 
 
 @dataclass(frozen=True)
-class Reach:
+class DrivenFreedoms:
     """Degrees of freedom that motors drive at a pose.
 
     Attributes
@@ -44,7 +44,7 @@ class Reach:
     more: bool
 
 
-def reach(system: System, state: State, freedoms: int) -> Reach:
+def driven_freedoms(system: System, state: State, freedoms: int) -> DrivenFreedoms:
     """Return the degrees of freedom driven by motors at a pose, and the smallest sets of motors that drive all.
 
     With S the columns of the motors' joint coordinates and Z a basis of the admissible motions, motors drive as many as
@@ -75,7 +75,7 @@ def reach(system: System, state: State, freedoms: int) -> Reach:
                 break
             if _rank(effect, chosen) == freedoms:
                 sets.append(tuple(motors[k] for k in chosen))
-    return Reach(freedoms, everything, modes, tuple(sets), more)
+    return DrivenFreedoms(freedoms, everything, modes, tuple(sets), more)
 
 
 def _rank(effect: Array, chosen: Sequence[int]) -> int:

@@ -13,7 +13,7 @@ class Inputs(NamedTuple):
     Attributes
     ----------
     motors, loads, prescribed : range
-        Signal numbers in the mechanism's own order; for loads, of the components that are laws in time.
+        Signal numbers in the mechanism's own order; for loads, of the components that are profiles in time.
     """
 
     motors: range
@@ -29,5 +29,5 @@ class Inputs(NamedTuple):
 def inputs_of(mechanism: Mechanism) -> Inputs:
     """Return the numbers of a mechanism's signals."""
     motors = len(mechanism.motors)
-    acting = motors + sum(len(load.laws) for load in mechanism.loads)
+    acting = motors + sum(len(load.profiles) for load in mechanism.loads)
     return Inputs(range(motors), range(motors, acting), range(acting, acting + len(mechanism.prescribed)))

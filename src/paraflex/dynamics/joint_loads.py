@@ -120,7 +120,7 @@ def load_in(
     return force, moment
 
 
-class Undetermined(NamedTuple):
+class UndeterminedLoads(NamedTuple):
     """Load components that are shared arbitrarily among redundant constraints.
 
     Attributes
@@ -138,7 +138,7 @@ class Undetermined(NamedTuple):
 
 def undetermined_loads(
     system: System, names: Sequence[str], q: Array, acting: NDArray[np.int64] | None = None
-) -> Undetermined:
+) -> UndeterminedLoads:
     """Find the loads of joints and of all drives that redundant rows share arbitrarily.
 
     Rows are redundant in all poses (k, n) or in none: the search ends at the first pose without redundant rows.
@@ -146,7 +146,7 @@ def undetermined_loads(
     """
     drives = system.mechanism.prescribed
     shapes = (len(names), 2), (len(names),), (len(drives),)
-    found = Undetermined(*(np.zeros((len(q), *shape), dtype=bool) for shape in shapes))
+    found = UndeterminedLoads(*(np.zeros((len(q), *shape), dtype=bool) for shape in shapes))
     arms = np.where([system.mechanism.slides(one.joint) for one in drives], system.size, 1.0)
     for k, pose in enumerate(q):
         free = dependence(system, pose, acting=acting).self_stresses(system.row_units)

@@ -242,7 +242,7 @@ def _inverse(solver: Saddle, n: int) -> scipy.sparse.linalg.LinearOperator:
     )
 
 
-class Slowest(NamedTuple):
+class LowestModes(NamedTuple):
     """Lowest squares, ascending, their shapes of unit modal mass, and the shift used to find them [rad^2/s^2]."""
 
     squares: Array
@@ -250,14 +250,14 @@ class Slowest(NamedTuple):
     shift: float
 
 
-def slowest(K: Sparse, M: Sparse, C: Sparse, typical: float, count: int, freedoms: int) -> Slowest:
+def slowest(K: Sparse, M: Sparse, C: Sparse, typical: float, count: int, freedoms: int) -> LowestModes:
     """Return the lowest squares of a mechanism with a given number of degrees of freedom.
 
     Lanczos' method is applied to the shifted inverse; few degrees of freedom are solved in a basis of all of them.
     """
     n, random = int(np.asarray(M.diagonal()).size), np.random.default_rng(0)
     if not freedoms:
-        return Slowest(np.zeros(0), np.zeros((n, 0)), typical)
+        return LowestModes(np.zeros(0), np.zeros((n, 0)), typical)
     if freedoms > _FEW and K.count_nonzero():
         shift, inverse = _low_shift(K, M, C, typical, min(count + 2, _FEW))
         start = inverse.matvec(M @ random.standard_normal(n))
@@ -265,7 +265,7 @@ def slowest(K: Sparse, M: Sparse, C: Sparse, typical: float, count: int, freedom
         order = np.argsort(squares)
         rounding = _ROUNDING * np.sum(np.abs(shapes) * (abs(K) @ np.abs(shapes)), axis=0)
         squares = np.where(np.abs(squares) < np.maximum(_FREE * shift, rounding), 0.0, squares)
-        return Slowest(squares[order], shapes[:, order], shift)
+        return LowestModes(squares[order], shapes[:, order], shift)
     inverse = _inverse(Saddle(scipy.sparse.csr_matrix(K + _ABOVE * typical * M), C), n)
     wishes = random.standard_normal((min(freedoms, _FEW), n))
     basis = np.column_stack([inverse.matvec(M @ wish) for wish in wishes])
@@ -274,7 +274,7 @@ def slowest(K: Sparse, M: Sparse, C: Sparse, typical: float, count: int, freedom
     basis = basis @ (directions[:, kept] / np.sqrt(size[kept]))
     squares, vectors = np.linalg.eigh(basis.T @ (K @ basis))
     squares = np.where(np.abs(squares) < _FREE * typical, 0.0, squares)
-    return Slowest(squares[:count], basis @ vectors[:, :count], typical)
+    return LowestModes(squares[:count], basis @ vectors[:, :count], typical)
 
 
 def _low_shift(

@@ -31,7 +31,7 @@ from paraflex.kernel.packed import (
 )
 from paraflex.kernel.sums import FIRST_MARKER
 from paraflex.kernel.vectors import padded
-from paraflex.mechanism import AngleLaw, Joint, Mechanism, PointRef
+from paraflex.mechanism import Joint, Mechanism, PointRef, TimeProfile
 
 # Fields of a line that a spring between points defines.
 _OF_SPRINGS = ("stiffness", "length", "damping")
@@ -187,19 +187,19 @@ def _tracks(bodies: list[BodyCoordinates]) -> tuple[list[dict], Array, Array]:
 
 
 def _load_records(mechanism: Mechanism, packer: _Packer) -> list[dict[str, float]]:
-    """Return records of loads: constant components as numbers, laws in time as signal numbers."""
-    signals, made = iter(inputs_of(mechanism).loads), []
+    """Return records of loads: constant components as numbers, profiles in time as signal numbers."""
+    signals, records = iter(inputs_of(mechanism).loads), []
     for load in mechanism.loads:
         record: dict[str, float] = dict.fromkeys(("x_signal", "y_signal", "torque_signal"), -1)
         record["marker"] = packer.add_marker(load.point)
         names = (("fx", "x_signal"), ("fy", "y_signal")) if load.kind == "force" else (("torque", "torque_signal"),)
         for (number, signal), given in zip(names, load.components, strict=True):
-            if isinstance(given, AngleLaw):
+            if isinstance(given, TimeProfile):
                 record[signal] = next(signals)
             else:
                 record[number] = given
-        made.append(record)
-    return made
+        records.append(record)
+    return records
 
 
 def _modal_rows(body: BodyCoordinates) -> Array:

@@ -36,7 +36,7 @@ _LEAST_MASS = 1e-7
 NAMED = 6
 _GAP_UNITS = {"positions": "m or rad", "velocities": "m/s or rad/s", "accelerations": "m/s^2 or rad/s^2"}
 # Remedy for contradicting constraints.
-AGREE = "leave one of these joints, gears or prescribed motions out, or choose places and laws that agree"
+AGREE = "leave one of these joints, gears or prescribed motions out, or choose places and profiles that agree"
 # Largest residual of constraint rates (sizes of the mechanism, rad; s), as a fraction of the wanted rates.
 _CONFLICT = 1e-6
 
@@ -138,7 +138,7 @@ def least_change(metric: Sparse, rows: Sparse, units: Array, damping: float = 0.
     if units.size > DENSE_ROWS:
         mean = float(np.mean(rows.multiply(rows) @ (1.0 / np.asarray(metric.diagonal(), dtype=float))))
         saddle = Saddle(metric, rows, np.full(units.size, damping * mean))
-        return lambda wanted: saddle.solve(r=wanted / units)[0]
+        return lambda target: saddle.solve(r=target / units)[0]
     dense = rows.toarray()
     weighted = scipy.sparse.linalg.splu(scipy.sparse.csc_matrix(metric)).solve(dense.T)
     schur = dense @ weighted
@@ -201,7 +201,7 @@ def row_unit(row: str) -> str:
     return "rad" if row.endswith(" angle") else "m"
 
 
-def refuse_conflict(system: System, what: str, t: float, q: Array, wanted: Array, left: Array) -> None:
+def refuse_conflict(system: System, what: str, t: float, q: Array, target: Array, left: Array) -> None:
     """Raise an error if a projection leaves a larger residual of rows (m,) than rounding explains.
 
     Raises
@@ -209,20 +209,20 @@ def refuse_conflict(system: System, what: str, t: float, q: Array, wanted: Array
     InconsistentConstraintsError
         Constraints contradict one another; the error names the joints, gears and prescribed motions involved.
     """
-    if not system.gap(left) > _CONFLICT * max(1.0, system.gap(wanted)):
+    if not system.gap(left) > _CONFLICT * max(1.0, system.gap(target)):
         return
-    cause = contradiction(system, wanted, dependence(system, q), what)
+    cause = contradiction(system, target, dependence(system, q), what)
     raise InconsistentConstraintsError(cause, Moment(t, 0), remedy=AGREE)
 
 
-def contradiction(system: System, wanted: Array, found: Dependence, what: str) -> str:
+def contradiction(system: System, target: Array, found: Dependence, what: str) -> str:
     """Describe the largest contradiction: that of the dropped row furthest from the value its sources imply."""
     if found.dropped.size:
-        conflict = np.abs(found.conflict(wanted))
+        conflict = np.abs(found.conflict(target))
         k = int(np.argmax(conflict))
         names, size = involved(system, found, k), float(conflict[k])
     else:
-        gaps = joint_gaps(system, wanted)
+        gaps = joint_gaps(system, target)
         names, size = list(gaps), max(gaps.values())
     more = f" and {len(names) - NAMED} more" if len(names) > NAMED else ""
     return (

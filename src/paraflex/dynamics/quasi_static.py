@@ -17,8 +17,8 @@ from paraflex.dynamics.rank import dependence
 from paraflex.dynamics.signals import moment_signals
 from paraflex.dynamics.state import VELOCITY_STIFFNESS, State
 from paraflex.dynamics.system import System, build_system
-from paraflex.mechanism import AngleLaw, Load, PrescribedAngle
-from paraflex.mechanism.laws import HeldAngle
+from paraflex.mechanism import Load, PrescribedAngle, TimeProfile
+from paraflex.mechanism.profiles import HeldAngle
 
 # Motion of the mechanism for a central difference [sizes of the mechanism, rad].
 _DIFFERENCE_MOVE = 1e-3
@@ -76,7 +76,7 @@ def balanced_state(system: System, start: State, driven: Mapping[str, JointMotio
     v and a the motion of the drives with links that keep their shape (the least v and a in the metric M + s K that
     constraints allow). Weight, loads and inertia forces are balanced, with dampers and friction at joints. The
     velocities of the start are those with which this pose follows the drives, by central differences, projected onto
-    the constraints: velocities of drives equal their laws to rounding. The inertia forces of the changing shape are
+    the constraints: velocities of drives equal their profiles to rounding. The inertia forces of the changing shape are
     neglected, a fraction (Omega / omega)^2 of the deflection for drives of angular frequency Omega and links of omega.
 
     Springs at joints count as elastic. If drives leave other degrees of freedom, the motion of these is not given: the
@@ -89,7 +89,7 @@ def balanced_state(system: System, start: State, driven: Mapping[str, JointMotio
     start : State
         State that starts the search; its v has no effect.
     driven : mapping of str to JointMotion
-        Joints, besides those with a prescribed law, that keep their coordinate of the start, slopes of beams included,
+        Joints without a prescribed motion that keep their coordinate of the start, slopes of beams included,
         and their motion there.
 
     Raises
@@ -97,10 +97,12 @@ def balanced_state(system: System, start: State, driven: Mapping[str, JointMotio
     AssemblyError
         No equilibrium is found near the start.
     """
-    prescribed = {law.joint: law for law in system.mechanism.prescribed}
+    prescribed = {one.joint: one for one in system.mechanism.prescribed}
     driven = {joint: motion for joint, motion in driven.items() if joint not in prescribed}
     now = np.array([start.time])
-    rates = [law.law.evaluate(now)[1][0] for law in prescribed.values()] + [motion.rate for motion in driven.values()]
+    rates = [one.profile.evaluate(now)[1][0] for one in prescribed.values()] + [
+        motion.rate for motion in driven.values()
+    ]
     if not np.any(rates):
         return static_equilibrium(system, start, list(driven))
     drives = _driven(system, start, driven)
@@ -147,9 +149,10 @@ class _Motion:
 
 
 def _driven(system: System, start: State, driven: Mapping[str, JointMotion]) -> System:
-    """Return the system with the joints driven too; drives and loads follow smooth laws from the start."""
+    """Return the system with the joints driven too; drives and loads follow smooth profiles from the start."""
     own = tuple(
-        replace(prescribed, law=_smooth(prescribed.law, start.time)) for prescribed in system.mechanism.prescribed
+        replace(prescribed, profile=_smooth(prescribed.profile, start.time))
+        for prescribed in system.mechanism.prescribed
     )
     values = {name: float(joint_coordinate(system, name, start.q[None]).value[0]) for name in driven}
     more = tuple(
@@ -161,12 +164,12 @@ def _driven(system: System, start: State, driven: Mapping[str, JointMotion]) -> 
 
 
 def _smooth_load(load: Load, time: float) -> Load:
-    parts = [_smooth(part, time) if isinstance(part, AngleLaw) else part for part in load.components]
+    parts = [_smooth(part, time) if isinstance(part, TimeProfile) else part for part in load.components]
     return replace(load, **{load.kind: tuple(parts) if len(parts) > 1 else parts[0]})
 
 
-def _smooth(law: AngleLaw, time: float) -> DrivenAngle:
-    value, rate, acceleration = (float(x[0]) for x in law.evaluate(np.array([time])))
+def _smooth(profile: TimeProfile, time: float) -> DrivenAngle:
+    value, rate, acceleration = (float(x[0]) for x in profile.evaluate(np.array([time])))
     return DrivenAngle(time, value, JointMotion(rate, acceleration))
 
 

@@ -12,13 +12,13 @@ from paraflex.arrays import Array
 from paraflex.dynamics.inputs import inputs_of
 from paraflex.errors import InputError
 from paraflex.kernel.packed import PackedSystem, Signals
-from paraflex.mechanism import AngleLaw, Mechanism, TabulatedLaw
+from paraflex.mechanism import Mechanism, TabulatedProfile, TimeProfile
 
-# Initial number of quintic Hermite pieces of a prescribed law per run, and largest numbers of pieces and halvings.
-# Pieces are halved until their midpoints are within _NEAR_LAW of the law, relative to its largest value, or within
-# _NEARLY_LAW if errors no longer fall to the fraction _FALLING.
-_LAW_PIECES, _MOST_PIECES, _HALVINGS = 2000, 500_000, 20
-_NEAR_LAW, _NEARLY_LAW, _FALLING = 1e-10, 1e-3, 0.25
+# Initial number of quintic Hermite pieces of a prescribed motion per run, and largest numbers of pieces and halvings.
+# Pieces are halved until their midpoints are within _NEAR_PROFILE of it, relative to its largest value, or within
+# _NEARLY_PROFILE if errors no longer fall to the fraction _FALLING.
+_PROFILE_PIECES, _MOST_PIECES, _HALVINGS = 2000, 500_000, 20
+_NEAR_PROFILE, _NEARLY_PROFILE, _FALLING = 1e-10, 1e-3, 0.25
 # Rounding error of cancelling terms of a prescribed motion [rad or m]; relative to values above one.
 LEFT = 2e-14
 _SHORTEST_PIECE = 1e-6
@@ -90,30 +90,30 @@ def pack_signals(mechanism: Mechanism, torques: Sequence[InputSignals], end: flo
     Returns
     -------
     Signals, knots
-        Packed signals, and the times at which a law is not smooth.
+        Packed signals, and the times at which a profile is not smooth.
 
     Raises
     ------
     InputError
-        A law does not cover the run or is not finite in it.
+        A profile does not cover the run or is not finite in it.
     """
     signals, knots = list(torques), []
-    for place, law in _laws(mechanism):
-        signal, inner = law_signal(place, law, end, LEFT if place.startswith("prescribed.") else 0.0)
+    for place, profile in _profiles(mechanism):
+        signal, inner = profile_signal(place, profile, end, LEFT if place.startswith("prescribed.") else 0.0)
         signals.append(signal)
         knots += inner
     return _pack(signals), knots
 
 
-def law_signal(place: str, law: AngleLaw, end: float, left: float = 0.0) -> tuple[InputSignals, list[float]]:
-    """Convert a law in time on [0, end] to a signal and the times between which it is smooth.
+def profile_signal(place: str, profile: TimeProfile, end: float, left: float = 0.0) -> tuple[InputSignals, list[float]]:
+    """Convert a profile in time on [0, end] to a signal and the times between which it is smooth.
 
     Parameters
     ----------
     place : str
-        Position of the law in a file, for errors.
-    law : AngleLaw
-        Law in time.
+        Position of the profile in a file, for errors.
+    profile : TimeProfile
+        Profile in time.
     end : float
         End of the run [s].
     left : float
@@ -122,49 +122,49 @@ def law_signal(place: str, law: AngleLaw, end: float, left: float = 0.0) -> tupl
     Raises
     ------
     InputError
-        The law does not cover the run or is not finite in it.
+        The profile does not cover the run or is not finite in it.
     """
-    inner = sorted(knot for knot in law.knots if 0.0 < knot < end)
-    if isinstance(law, TabulatedLaw) and law.linear:
-        t = _grid(law, 0.0, end, end)
-        value, lines = _evaluate(place, law, t)[0], np.zeros((t.size - 1, _DEGREE + 1))
+    inner = sorted(knot for knot in profile.knots if 0.0 < knot < end)
+    if isinstance(profile, TabulatedProfile) and profile.linear:
+        t = _grid(profile, 0.0, end, end)
+        value, lines = _evaluate(place, profile, t)[0], np.zeros((t.size - 1, _DEGREE + 1))
         lines[:, 0], lines[:, 1] = value[:-1], np.diff(value) / np.diff(t)
-        return InputSignals(t, lines), [stop for stop in law.stops if 0.0 < stop < end]
-    if getattr(law, "breaks", None) is not None:
+        return InputSignals(t, lines), [stop for stop in profile.stops if 0.0 < stop < end]
+    if getattr(profile, "breaks", None) is not None:
         left = 0.0  # quintic already
-    # The law or a derivative may jump at a knot: the pieces on either side take its one-sided limits.
+    # The profile or a derivative may jump at a knot: the pieces on either side take its one-sided limits.
     parts = []
     for a, b in pairwise([0.0, *inner, end]):
-        parts.append(_refined(place, law, _grid(law, a, b, end), left))
+        parts.append(_refined(place, profile, _grid(profile, a, b, end), left))
     breaks = np.concatenate([part.breaks[:-1] for part in parts] + [parts[-1].breaks[-1:]])
     return InputSignals(breaks, np.vstack([part.coefficients for part in parts])), inner
 
 
-def _refined(place: str, law: AngleLaw, t: Array, left: float) -> InputSignals:
-    """Return quintic pieces of a law between breaks, halved where the law changes too fast for them.
+def _refined(place: str, profile: TimeProfile, t: Array, left: float) -> InputSignals:
+    """Return quintic pieces of a profile between breaks, halved where the profile changes too fast for them.
 
     Raises
     ------
     InputError
-        The law fails as in `law_signal`, or it changes so fast that there are too many pieces.
+        The profile fails as in `profile_signal`, or it changes so fast that there are too many pieces.
     """
     a, b = t[0], t[-1]
     # Values and derivatives at the ends of a smooth interval are those inside it.
     low, high = max(a + 1e-12 * (b - a), np.nextafter(a, b)), min(b - 1e-12 * (b - a), np.nextafter(b, a))
     last = np.inf
     for _ in range(_HALVINGS):
-        value, rate, acceleration = _evaluate(place, law, np.clip(t, low, high))
+        value, rate, acceleration = _evaluate(place, profile, np.clip(t, low, high))
         outside = t - np.clip(t, low, high)
         pieces = piecewise_quintic(t, value + outside * rate, rate + outside * acceleration, acceleration, left)
         half = 0.5 * np.diff(t)
-        value = _evaluate(place, law, t[:-1] + half)[0]
+        value = _evaluate(place, profile, t[:-1] + half)[0]
         powers = half[:, None] ** np.arange(_DEGREE + 1)
         off = np.abs(np.sum(powers * pieces.coefficients, axis=1) - value)
         size, worst = np.max(np.abs(value)), np.max(off)
-        near = max(_NEAR_LAW * size, left)
+        near = max(_NEAR_PROFILE * size, left)
         coarse = off > near
         # Errors of rounding and of kinks do not decrease with the length of pieces.
-        if worst <= near or (worst <= _NEARLY_LAW * size and worst > _FALLING * last):
+        if worst <= near or (worst <= _NEARLY_PROFILE * size and worst > _FALLING * last):
             return pieces
         last = worst
         t = np.sort(np.append(t, t[:-1][coarse] + half[coarse]))
@@ -172,7 +172,7 @@ def _refined(place: str, law: AngleLaw, t: Array, left: float) -> InputSignals:
             break
     raise InputError(
         f"it changes too fast between t = {a:g} and {b:g} s to be followed", field=place,
-        remedy="give a shorter duration, or smoother laws; where it jumps or has a kink, pieces that end there",
+        remedy="give a shorter duration, or smoother profiles; where it jumps or has a kink, pieces that end there",
     )  # fmt: skip
 
 
@@ -182,17 +182,17 @@ def still_signals(mechanism: Mechanism, end: float) -> tuple[Signals, list[float
 
 
 def moment_signals(mechanism: Mechanism, time: float) -> Signals:
-    """Return signals valid at one time: no torques; laws with their rate and acceleration."""
+    """Return signals valid at one time: no torques; profiles with their rate and acceleration."""
     signals = _no_torques(mechanism, 1.0)
-    for place, law in _laws(mechanism):
-        value, rate, acceleration = (float(x[0]) for x in _evaluate(place, law, np.array([time])))
+    for place, profile in _profiles(mechanism):
+        value, rate, acceleration = (float(x[0]) for x in _evaluate(place, profile, np.array([time])))
         taylor = np.array([[value, rate, 0.5 * acceleration, 0.0, 0.0, 0.0]])
         signals.append(InputSignals(np.array([time, time + 1.0]), taylor))
     return _pack(signals)
 
 
 def acting_loads(mechanism: Mechanism, t: Array, *, before: bool = False) -> Array:
-    """Return the load components (k, acting) that are laws in time, at given times; zero for motors [N, N m].
+    """Return the load components (k, acting) that are profiles in time, at given times; zero for motors [N, N m].
 
     Parameters
     ----------
@@ -206,34 +206,34 @@ def acting_loads(mechanism: Mechanism, t: Array, *, before: bool = False) -> Arr
     inputs = inputs_of(mechanism)
     acting = np.zeros((t.size, inputs.acting))
     at = np.nextafter(t, -np.inf) if before else t
-    for k, (place, law) in zip(inputs.loads, _laws(mechanism), strict=False):
-        acting[:, k] = _evaluate(place, law, at)[0]
+    for k, (place, profile) in zip(inputs.loads, _profiles(mechanism), strict=False):
+        acting[:, k] = _evaluate(place, profile, at)[0]
     return acting
 
 
-def _laws(mechanism: Mechanism) -> Iterator[tuple[str, AngleLaw]]:
-    """Yield the laws of loads, then of prescribed motions, each with its position in a file."""
-    yield from ((f"load.{load.name}", law) for load in mechanism.loads for law in load.laws)
-    yield from ((f"prescribed.{one.name}", one.law) for one in mechanism.prescribed)
+def _profiles(mechanism: Mechanism) -> Iterator[tuple[str, TimeProfile]]:
+    """Yield the profiles of loads, then of prescribed motions, each with its position in a file."""
+    yield from ((f"load.{load.name}", profile) for load in mechanism.loads for profile in load.profiles)
+    yield from ((f"prescribed.{one.name}", one.profile) for one in mechanism.prescribed)
 
 
 def _no_torques(mechanism: Mechanism, end: float) -> list[InputSignals]:
     return constant_signals([0.0 for _ in inputs_of(mechanism).motors], end)
 
 
-def _grid(law: AngleLaw, a: float, b: float, end: float) -> Array:
-    """Return the breaks of a law's pieces on [a, b]: its own if it is a quintic between them, else many."""
-    breaks = getattr(law, "breaks", None)
+def _grid(profile: TimeProfile, a: float, b: float, end: float) -> Array:
+    """Return the breaks of a profile's pieces on [a, b]: its own if it is a quintic between them, else many."""
+    breaks = getattr(profile, "breaks", None)
     if breaks is None:
-        return np.linspace(a, b, max(8, round(_LAW_PIECES * (b - a) / end)) + 1)
+        return np.linspace(a, b, max(8, round(_PROFILE_PIECES * (b - a) / end)) + 1)
     # A piece of nearly zero length would have no accurate second derivative.
     margin = _SHORTEST_PIECE * (b - a)
     return np.array([a, *(t for t in breaks if a + margin < t < b - margin), b])
 
 
-def _evaluate(place: str, law: AngleLaw, t: Array) -> tuple[Array, Array, Array]:
+def _evaluate(place: str, profile: TimeProfile, t: Array) -> tuple[Array, Array, Array]:
     try:
-        return law.evaluate(t)
+        return profile.evaluate(t)
     except InputError as error:
         raise error.within(place) from None
 

@@ -13,7 +13,7 @@ from paraflex.dynamics.projection import joint_gaps
 from paraflex.dynamics.rank import Dependence, dependence, involved, joint_of_row
 from paraflex.dynamics.signals import moment_signals
 from paraflex.dynamics.sparse import Saddle, sparse_jacobian, sparse_mass
-from paraflex.dynamics.state import State, close_downhill, consistent_state, reference_pose
+from paraflex.dynamics.state import State, consistent_state, minimise_gaps, reference_pose
 from paraflex.dynamics.system import System
 from paraflex.errors import AssemblyError, InconsistentConstraintsError, ProportionError
 from paraflex.limits import solvable
@@ -212,7 +212,7 @@ def _poses_nearby(system: System, state: State) -> Iterator[Array]:
         move = solver.solve(M @ wish)[0]
         move *= _NUDGE / max(np.max(np.abs(move[angles])), np.max(np.abs(move[places])) / size)
         for sign in (1.0, -1.0):
-            q = close_downhill(system, signals, state.time, state.q + sign * move)
+            q = minimise_gaps(system, signals, state.time, state.q + sign * move)
             gap = system.gap(system.constraints(signals, state.time, q)[0])
             gone = q - state.q
             # At an isolated pose closing the loops leads back to it.

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from paraflex.arguments import checked_arguments
 from paraflex.arrays import Array
+from paraflex.dynamics.change_points import change_point_at
 from paraflex.dynamics.coordinates import BodyCoordinates, end_markers
 from paraflex.dynamics.following import POSITION_STIFFNESS, follow_drives
 from paraflex.dynamics.joint_coordinates import joint_coordinate
@@ -19,7 +20,6 @@ from paraflex.dynamics.points import marker_place
 from paraflex.dynamics.projection import assemble, constraint_change, least_change, link_metric, project
 from paraflex.dynamics.rank import constraint_jacobian
 from paraflex.dynamics.signals import moment_signals
-from paraflex.dynamics.special import special_start
 from paraflex.dynamics.state import (
     VELOCITY_STIFFNESS,
     State,
@@ -78,7 +78,7 @@ def start_state(
     q : (n,) array, optional
         Coordinates from elsewhere, for example of a static equilibrium; the start then gives velocities only.
     time : float
-        Time of prescribed laws [s]; zero by default.
+        Time of prescribed motions [s]; zero by default.
 
     Raises
     ------
@@ -237,10 +237,12 @@ def _closed(system: System, signals: Signals, time: float, q: Array, held: NDArr
 
 def _velocities(system: System, signals: Signals, start: Start, time: float, q: Array) -> Array:
     _, rate = system.constraints(signals, time, q)
-    given = _given_velocities(system, start, q)
-    C = scipy.sparse.csr_matrix(scipy.sparse.vstack([constraint_jacobian(system, q), *(entry.row for entry in given)]))
-    wanted = np.concatenate([-rate, [entry.value for entry in given]])
-    units = np.concatenate([system.row_units, [entry.unit for entry in given]])
+    entries = _velocity_entries(system, start, q)
+    C = scipy.sparse.csr_matrix(
+        scipy.sparse.vstack([constraint_jacobian(system, q), *(entry.row for entry in entries)])
+    )
+    target = np.concatenate([-rate, [entry.value for entry in entries]])
+    units = np.concatenate([system.row_units, [entry.unit for entry in entries]])
     if set(start.rates) == set(system.index):
         v = np.zeros(system.n)
         for name, values in start.rates.items():
@@ -249,19 +251,19 @@ def _velocities(system: System, signals: Signals, start: Start, time: float, q: 
     else:
         for stiffness in (VELOCITY_STIFFNESS, 0.0):
             change = least_change(link_metric(system, q, stiffness), C, units)
-            v = project(change, np.zeros(system.n), lambda v: C @ v - wanted)
+            v = project(change, np.zeros(system.n), lambda v: C @ v - target)
             # Flexures move by bending alone: with stiff links their projection is too ill-conditioned.
-            missed, largest = (float(np.max(np.abs(each) / units, initial=0.0)) for each in (C @ v - wanted, wanted))
+            missed, largest = (float(np.max(np.abs(each) / units, initial=0.0)) for each in (C @ v - target, target))
             if missed <= _SLIP * _SMALL_TERMS * largest:
                 break
-    slip = np.abs(C @ v - wanted)
+    slip = np.abs(C @ v - target)
     # Residual relative to the terms of each row, lengths in sizes of the mechanism.
-    size = np.maximum(abs(C) @ np.abs(v), np.abs(wanted)) / units
+    size = np.maximum(abs(C) @ np.abs(v), np.abs(target)) / units
     bad = slip / units > _SLIP * np.maximum(size, np.max(size, initial=0.0) * _SMALL_TERMS)
     if np.any(bad):
-        _refuse_velocities(system, given, slip, bad)
-    fields = [entry.field for entry in given]
-    found = special_start(system, signals, time, q, C, wanted)
+        _refuse_velocities(system, entries, slip, bad)
+    fields = [entry.field for entry in entries]
+    found = change_point_at(system, signals, time, q, C, target)
     if found.cause:
         raise InputError(found.cause, field=fields[0] if fields else "start", remedy=found.remedy)
     try:
@@ -269,19 +271,19 @@ def _velocities(system: System, signals: Signals, start: Start, time: float, q: 
     except InconsistentConstraintsError as error:
         # The branches are known without the velocity that contradicts them.
         for k, one in enumerate(fields):
-            others = np.arange(len(wanted)) != system.m + k
-            found = special_start(system, signals, time, q, C[others], wanted[others])
+            others = np.arange(len(target)) != system.m + k
+            found = change_point_at(system, signals, time, q, C[others], target[others])
             for branch in found.velocities:
-                if np.all(np.abs(C @ branch - wanted) < _PRINTED * units * np.max(np.abs(wanted))):
+                if np.all(np.abs(C @ branch - target) < _PRINTED * units * np.max(np.abs(target))):
                     return branch
             if found.cause:
                 problem = f"on neither branch of {found.cause}"
-                raise InputError(problem, field=one, value=given[k].value, remedy=found.remedy) from None
+                raise InputError(problem, field=one, value=entries[k].value, remedy=found.remedy) from None
         raise InputError(error.cause.rstrip(","), field="start", remedy=error.remedy) from None
     return v
 
 
-class _Given(NamedTuple):
+class _VelocityEntry(NamedTuple):
     """A given velocity: its row (1, n), value, scale, and field."""
 
     row: scipy.sparse.csr_matrix
@@ -290,31 +292,31 @@ class _Given(NamedTuple):
     field: str
 
 
-def _given_velocities(system: System, start: Start, q: Array) -> list[_Given]:
+def _velocity_entries(system: System, start: Start, q: Array) -> list[_VelocityEntry]:
     unit = scipy.sparse.csr_matrix(scipy.sparse.identity(system.n))
     given = [
-        _Given(unit[system.body(name).angle], rate, 1.0, f"start.velocity.angular.{name}")
+        _VelocityEntry(unit[system.body(name).angle], rate, 1.0, f"start.velocity.angular.{name}")
         for name, rate in start.angular.items()
     ]
     for ref, velocity in start.point.items():
         rows = scipy.sparse.csr_matrix(point_rows(system, q, ref))
-        given += [_Given(rows[k], velocity[k], system.size, f"start.velocity.point.{ref}") for k in range(2)]
+        given += [_VelocityEntry(rows[k], velocity[k], system.size, f"start.velocity.point.{ref}") for k in range(2)]
     for name, values in start.rates.items():
         body, field = system.body(name), f"start.rates.{name}"
         given += [
-            _Given(unit[body.offset + k], float(rate), float(system.units[body.offset + k]), field)
+            _VelocityEntry(unit[body.offset + k], float(rate), float(system.units[body.offset + k]), field)
             for k, rate in enumerate(_all_values(body, values, field))
         ]
     return given
 
 
-def _refuse_velocities(system: System, given: list[_Given], slip: Array, bad: NDArray[np.bool_]) -> None:
+def _refuse_velocities(system: System, entries: list[_VelocityEntry], slip: Array, bad: NDArray[np.bool_]) -> None:
     worst = int(np.argmax(np.where(bad, slip, 0.0)))
     where = system.rows[worst] if worst < system.m else "what is given"
     of_given = slip[system.m :]
-    entry = given[int(np.argmax(of_given))] if given else None
+    entry = entries[int(np.argmax(of_given))] if entries else None
     raise InputError(
-        f"joints, prescribed laws and given velocities contradict each other by {slip[worst]:.3g} m/s or rad/s in "
+        f"joints, prescribed motions and given velocities contradict each other by {slip[worst]:.3g} m/s or rad/s in "
         f"{where}",
         field="start" if entry is None else entry.field,
         value=None if entry is None else entry.value,

@@ -10,8 +10,9 @@ from functools import partial
 import numpy as np
 import scipy
 
-from paraflex.arguments import checked_arguments, given_as
+from paraflex.arguments import checked_arguments, named_in_errors
 from paraflex.arrays import Array
+from paraflex.dynamics.change_points import branches_from_rest, change_point_at
 from paraflex.dynamics.following import POSITION_STIFFNESS, follow_drives
 from paraflex.dynamics.points import marker_position
 from paraflex.dynamics.projection import (
@@ -27,7 +28,6 @@ from paraflex.dynamics.projection import (
 )
 from paraflex.dynamics.signals import moment_signals
 from paraflex.dynamics.sparse import body_masses, sparse_mass
-from paraflex.dynamics.special import branches_from_rest, special_start
 from paraflex.dynamics.system import System, build_system
 from paraflex.errors import AssemblyError, InconsistentConstraintsError, Moment
 from paraflex.kernel.packed import Signals
@@ -45,7 +45,7 @@ _LARGEST_DEFLECTION = 0.1
 VELOCITY_STIFFNESS = 1e9
 
 
-@given_as("a state", "a state, as dynamics.consistent_state makes it")
+@named_in_errors("a state", "a state, as dynamics.consistent_state makes it")
 @dataclass(frozen=True)
 class State:
     """State of a system: time [s], coordinates q (n,) and velocities v (n,)."""
@@ -224,11 +224,11 @@ def _closest(system: System, signals: Signals, t: float, q: Array) -> Array:
     aside[[body.angle for body in system.bodies]] += _ASIDE * np.random.default_rng(0).standard_normal(
         len(system.bodies)
     )
-    q = close_downhill(system, signals, t, aside)
+    q = minimise_gaps(system, signals, t, aside)
     return reference_pose(system, Assembly("closest", {body.name: float(q[body.angle]) for body in system.bodies}))
 
 
-def close_downhill(system: System, signals: Signals, t: float, q: Array) -> Array:
+def minimise_gaps(system: System, signals: Signals, t: float, q: Array) -> Array:
     """Return coordinates near q with the smallest gaps of all joints, by the Levenberg-Marquardt method.
 
     The method is slower and less accurate than `project_position`, but suits singular configurations and loops that
@@ -258,7 +258,7 @@ def project_velocity(system: System, signals: Signals, t: float, q: Array, v: Ar
     Raises
     ------
     InconsistentConstraintsError
-        There are none: two prescribed laws contradict one another.
+        There are none: two prescribed motions contradict one another.
     """
 
     def left(v: Array) -> Array:
@@ -317,8 +317,8 @@ def consistent_state(
             v = project_velocity(system, signals, time, q, velocity)
         check_accelerations(system, signals, time, q, v)
     except InconsistentConstraintsError as error:
-        wanted = -system.constraints(signals, time, q)[1]
-        found = special_start(system, signals, time, q, system.jacobian(q), wanted)
+        target = -system.constraints(signals, time, q)[1]
+        found = change_point_at(system, signals, time, q, system.jacobian(q), target)
         if not found.cause:
             raise
         raise InconsistentConstraintsError(f"{found.cause},", error.moment, remedy=found.remedy) from None
@@ -331,15 +331,15 @@ def check_accelerations(system: System, signals: Signals, t: float, q: Array, v:
     Raises
     ------
     InconsistentConstraintsError
-        There are none: two prescribed laws contradict one another, or a singular configuration is in motion. Or there
-        are two, from rest at a change point.
+        There are none: two prescribed motions contradict one another, or a singular configuration is in motion. Or
+        there are two, from rest at a change point.
     """
     if not np.any(v) and branches_from_rest(system, signals, t, q):
         cause = "prescribed motions begin at rest at a change point, from which two branches lead on,"
         raise InconsistentConstraintsError(cause, Moment(t, 0), remedy="start beside this pose, or in motion")
     rest = np.zeros(system.n)
-    wanted = second_rates(system, signals, t, q, v, rest)
-    if np.any(wanted):
+    target = second_rates(system, signals, t, q, v, rest)
+    if np.any(target):
         left = partial(second_rates, system, signals, t, q, v)
         found = project(constraint_change(system, q), rest, left)
-        refuse_conflict(system, "accelerations", t, q, wanted, left(found))
+        refuse_conflict(system, "accelerations", t, q, target, left(found))

@@ -10,7 +10,7 @@ from typing import Any, TypeVar
 import numpy as np
 import scipy
 
-from paraflex.arguments import checked_arguments, given_as
+from paraflex.arguments import checked_arguments, named_in_errors
 from paraflex.arrays import Array
 from paraflex.dynamics.body_bases import is_reduced, reduced_body
 from paraflex.dynamics.constraints import RowTerm, row_order, terms_by_joint
@@ -30,7 +30,7 @@ _USUAL = 1e3
 T = TypeVar("T")
 
 
-@given_as("a system", "the system that dynamics.build_system makes")
+@named_in_errors("a system", "the system that dynamics.build_system makes")
 @dataclass(frozen=True)
 class System:
     """A mechanism as constant arrays, made by `build_system`.

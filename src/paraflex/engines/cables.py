@@ -70,7 +70,7 @@ class Trajectory:
         return Trajectory(self.t[::every], self.states[:, ::every], self.multipliers[::every])
 
 
-class Turn(NamedTuple):
+class AngularMotion(NamedTuple):
     """Angle [rad], rate and angular acceleration of the material at a point, each (k,)."""
 
     angle: Array
@@ -95,9 +95,9 @@ class Ground:
         still = np.zeros((history.t.size, 2))
         return PointMotion(still + self.points[point], still, still)
 
-    def turn(self, point: str, history: Trajectory) -> Turn:
+    def turn(self, point: str, history: Trajectory) -> AngularMotion:
         """Return zeros: the ground does not move."""
-        return Turn(*np.zeros((3, history.t.size)))
+        return AngularMotion(*np.zeros((3, history.t.size)))
 
 
 @dataclass(frozen=True)
@@ -146,15 +146,15 @@ class RigidLink:
         places = drawn.places - drawn.places[station] + self.points[point]
         return turned(history.states[0][:, self.columns[:2]], self.frame(history).angle, places)
 
-    def turn(self, point: str, history: Trajectory) -> Turn:
+    def turn(self, point: str, history: Trajectory) -> AngularMotion:
         """Return the rotation of the material at a named point."""
         return self.frame(history)
 
-    def frame(self, history: Trajectory) -> Turn:
+    def frame(self, history: Trajectory) -> AngularMotion:
         """Return the rotation of the body."""
-        return Turn(*history.states[:, :, self.columns[2]])
+        return AngularMotion(*history.states[:, :, self.columns[2]])
 
-    def chord(self, history: Trajectory) -> Turn:
+    def chord(self, history: Trajectory) -> AngularMotion:
         """Return the rotation of the body."""
         return self.frame(history)
 
@@ -240,15 +240,15 @@ class Cable:
             rows[i, 2 * e : 2 * e + 4] = _shape(np.array([along / length]), length, 0)
         return rows @ history.states[0][:, self.columns]
 
-    def turn(self, point: str, history: Trajectory) -> Turn:
+    def turn(self, point: str, history: Trajectory) -> AngularMotion:
         """Return the rotation of the tangent at a named point."""
         return self._tangent(self.points[point], history)
 
-    def frame(self, history: Trajectory) -> Turn:
+    def frame(self, history: Trajectory) -> AngularMotion:
         """Return the rotation of the tangent at the first end."""
         return self._tangent(0, history)
 
-    def chord(self, history: Trajectory) -> Turn:
+    def chord(self, history: Trajectory) -> AngularMotion:
         """Return the rotation of the chord from the first to the last end."""
         return turn_of(self.start, *self._line(history))
 
@@ -301,7 +301,7 @@ class Cable:
         stiffest = float(np.max(self._along("axial_stiffness", 1) / np.diff(self.mesh.nodes)))
         return float(np.finfo(float).eps) * stiffest * far
 
-    def _tangent(self, node: int, history: Trajectory) -> Turn:
+    def _tangent(self, node: int, history: Trajectory) -> AngularMotion:
         return turn_of(self.start, *history.states[:, :, self.columns[1::2][node]])
 
     def _line(self, history: Trajectory) -> Array:
@@ -344,13 +344,13 @@ class Linkage:
         """Return the vector from point a to point b of a joint, with two derivatives (3, k, 2)."""
         return np.subtract(self.motion(joint.b, history), self.motion(joint.a, history))
 
-    def joint_turn(self, joint: Joint, history: Trajectory) -> Turn:
+    def joint_turn(self, joint: Joint, history: Trajectory) -> AngularMotion:
         """Return the rotation of the material at point b of a joint relative to that at point a."""
         a, b = (self.part(ref).turn(ref.point, history) for ref in (joint.a, joint.b))
-        return Turn(*np.subtract(b, a))
+        return AngularMotion(*np.subtract(b, a))
 
 
-def turn_of(start: float, d: Array, v: Array, a: Array) -> Turn:
+def turn_of(start: float, d: Array, v: Array, a: Array) -> AngularMotion:
     """Return the continuous angle of a vector d (k, 2), which begins near `start` [rad], with two derivatives.
 
     v and a are the first and second derivatives of d.
@@ -359,7 +359,7 @@ def turn_of(start: float, d: Array, v: Array, a: Array) -> Turn:
     angle += 2.0 * np.pi * np.round((start - angle[:1]) / (2.0 * np.pi))
     square = np.sum(d**2, axis=1)
     rate = _cross(d, v) / square
-    return Turn(angle, rate, (_cross(d, a) - 2.0 * rate * np.sum(d * v, axis=1)) / square)
+    return AngularMotion(angle, rate, (_cross(d, a) - 2.0 * rate * np.sum(d * v, axis=1)) / square)
 
 
 def _cross(a: Array, b: Array) -> Array:

@@ -63,12 +63,12 @@ def check_engine(name: str, mechanism: Mechanism) -> None:
     related = [(group, one) for group, members in grouped(mechanism) if group.relates for one in members]
     if name == "exudyn":
         for group, one in related:
-            refuse("Exudyn", f"a {group.word}", f"{group.table}.{one.name}")
+            refuse("Exudyn", f"a {group.noun}", f"{group.table}.{one.name}")
     if name == "mujoco":
         closing = {joint.name for joint in spanning_tree(mechanism).closing}
         for group, one in related:
             if closing.intersection(one.joints):
-                refuse("MuJoCo", f"a {group.word} where a loop closes", f"{group.table}.{one.name}")
+                refuse("MuJoCo", f"a {group.noun} where a loop closes", f"{group.table}.{one.name}")
         for spring in mechanism.springs:
             if spring.joint in closing:
                 refuse("MuJoCo", "a spring where a loop closes", f"spring.{spring.name}")

@@ -100,10 +100,10 @@ def simulate_mujoco(task: TrackingTask, mode: str | ActuationMode, options: MuJo
         _solution(task, q, v, a, motion, count, time.perf_counter() - began),
         method=f"MuJoCo {mujoco.__version__}, RK4",
     )
-    if motion.trouble:
+    if motion.failure:
         reached = task.motion.t[motion.samples - 1]
         moment = Moment(float(reached), (motion.samples - 1) * count)
-        raise IntegrationError(motion.trouble, moment, record(run), "give it a shorter step")
+        raise IntegrationError(motion.failure, moment, record(run), "give it a shorter step")
     return record(run)
 
 
@@ -179,7 +179,7 @@ class _JointMotion:
     joints: tuple[Array, Array, Array]
     energy: Array
     work: Array
-    trouble: str
+    failure: str
 
     @property
     def samples(self) -> int:
@@ -262,8 +262,8 @@ def _solution(
         kinetic_energy=kinetic,
         strain_energy=strain,
         work=work,
-        status="failed" if motion.trouble else "complete",
-        message=motion.trouble,
+        status="failed" if motion.failure else "complete",
+        message=motion.failure,
         steps=count * (motion.samples - 1),
         rejected=0,
         newton_iterations=0,

@@ -1,3 +1,3 @@
-from .given import StaticsDefaults as StaticsDefaults
+from .conditions import StaticsDefaults as StaticsDefaults
 from .result import Statics as Statics
 from .steps import statics as statics

@@ -64,7 +64,7 @@ class Point(NamedTuple):
     limit: bool = False
 
 
-class _Failed(Exception):
+class _NewtonFailure(Exception):
     """Failure of Newton's iteration: it did not converge, or its matrix is singular."""
 
 
@@ -93,11 +93,11 @@ class Branch:
         """
         begin = self.equations.guess()
         try:
-            found = self._solve(begin, self._only_s(begin), 0.0, longest=_LONGEST_MOVE)
+            found = self._solve(begin, self._load_factor_only(begin), 0.0, longest=_LONGEST_MOVE)
             if self.equations.gap(found) > _GAP:
                 raise EquilibriumError("held coordinates contradict the joints", remedy="hold fewer coordinates")
-            return Point(found, self._tangent(found, self._only_s(found)))
-        except _Failed:
+            return Point(found, self._tangent(found, self._load_factor_only(found)))
+        except _NewtonFailure:
             raise EquilibriumError("no static equilibrium is found near the start", remedy=_LOOSE) from None
 
     def follow(self, first: Point, steps: int, goal: float = 1.0) -> Iterator[Point]:
@@ -122,7 +122,7 @@ class Branch:
         move = self._size(first.tangent._replace(s=0.0)) / max(abs(first.tangent.s), 1e-300)
         move = move if move > _NO_MOVE else 0.0
         branch = replace(self, weight=self.weight / move**2) if move > 0.0 else self
-        here = Point(first.at, branch._tangent(first.at, branch._only_s(first.at)))
+        here = Point(first.at, branch._tangent(first.at, branch._load_factor_only(first.at)))
         longest = _LONGEST * np.sqrt(2.0) / steps
         step, turned, furthest = 0.5 * longest, False, 0.0
         for _ in range(_MOST_STEPS):
@@ -149,7 +149,7 @@ class Branch:
         raise self._ended(turned, furthest)
 
     def _ended(self, turned: bool, furthest: float) -> EquilibriumError:
-        given = self.equations.given.words
+        given = self.equations.conditions.description
         if turned:
             cause = (
                 f"no equilibrium beyond load factor {furthest:.6g} ({given}): the branch turns back there, "
@@ -172,7 +172,7 @@ class Branch:
                 remedy="leave it out, or hold and move less",
             )
         return EquilibriumError(
-            f"no equilibrium is found beyond load factor {at.s:.6g} ({self.equations.given.words})",
+            f"no equilibrium is found beyond load factor {at.s:.6g} ({self.equations.conditions.description})",
             remedy="joints may not allow more, or links touch parts that the model lacks: give less",
         )
 
@@ -184,7 +184,7 @@ class Branch:
                 counted: list[int] = []
                 found = self._solve(here.at.plus(here.tangent, step), here.tangent, None, counted=counted)
                 tangent = self._tangent(found, here.tangent)
-            except _Failed:
+            except _NewtonFailure:
                 step *= _SHRINK
                 continue
             if self._product(tangent, here.tangent) < _STRAIGHT or self.equations.gap(found) > _GAP:
@@ -202,7 +202,7 @@ class Branch:
         for k in inside:
             try:
                 yield self._at_fraction(a, b, k / steps)
-            except _Failed:
+            except _NewtonFailure:
                 # This close to a limit point no Newton iteration at a given fraction converges.
                 continue
 
@@ -215,7 +215,7 @@ class Branch:
         else:
             part = float(scipy.optimize.brentq(lambda x: self._cubic(a, b, length, x).s - s, 0.0, 1.0))
         begin = self._cubic(a, b, length, part)._replace(s=s)
-        found = self._solve(begin, self._only_s(begin), s)
+        found = self._solve(begin, self._load_factor_only(begin), s)
         return Point(found, self._tangent(found, a.tangent))
 
     @staticmethod
@@ -239,7 +239,7 @@ class Branch:
             try:
                 at = self._solve(a.at.plus(a.tangent, step), a.tangent, None)
                 found = Point(at, self._tangent(at, a.tangent), limit=True)
-            except _Failed:
+            except _NewtonFailure:
                 break
             value = found.tangent.s
             if abs(value) <= _AT_LIMIT or abs(high - low) <= 1e-14 * abs(high):
@@ -260,7 +260,7 @@ class Branch:
             return False
         try:
             found = self._at_fraction(a, b, 0.0)
-        except _Failed:
+        except _NewtonFailure:
             return False
         apart = found.at.q - first.at.q
         for body in self.equations.system.bodies:
@@ -275,7 +275,7 @@ class Branch:
     def _size(self, change: Unknowns) -> float:
         return float(np.sqrt(self._product(change, change)))
 
-    def _only_s(self, like: Unknowns) -> Unknowns:
+    def _load_factor_only(self, like: Unknowns) -> Unknowns:
         """Return a change of the fraction alone."""
         return Unknowns(np.zeros_like(like.q), np.zeros_like(like.mu), 1.0)
 
@@ -298,9 +298,9 @@ class Branch:
         try:
             change = solved(matrix, units, np.concatenate([f, phi[kept], [product]]))
         except np.linalg.LinAlgError:
-            raise _Failed from None
+            raise _NewtonFailure from None
         if not np.all(np.isfinite(change)):
-            raise _Failed
+            raise _NewtonFailure
         mu = np.zeros(phi.size)
         mu[kept] = change[n:-1]
         return Unknowns(change[:n], mu, float(change[-1]))
@@ -321,12 +321,15 @@ class Branch:
         longest: float = np.inf,
         counted: list[int] | None = None,
     ) -> Unknowns:
-        """Find an equilibrium by Newton's iteration, normal to a direction or at a fraction; else raise `_Failed`."""
+        """Find an equilibrium by Newton iteration, normal to a direction or at a fraction.
+
+        Raises `_NewtonFailure` if it fails.
+        """
         at, before = begin, np.inf
         for number in range(1, _MOST_ITERATIONS + 1):
             f, phi = self.equations.residual(at)
             if not (np.all(np.isfinite(f)) and np.all(np.isfinite(phi))):
-                raise _Failed
+                raise _NewtonFailure
             left = -self._product(at.plus(begin, -1.0), across) if fraction is None else fraction - at.s
             change = self._change(at, across, -f, -phi, left)
             move = float(np.max(np.abs(change.q / self.equations.scale)))
@@ -336,6 +339,6 @@ class Branch:
                     counted.append(number)
                 return at
             if np.isinf(longest) and (move > 10.0 * before or (number > _MOST_ITERATIONS // 2 and move > before)):
-                raise _Failed
+                raise _NewtonFailure
             before = move
-        raise _Failed
+        raise _NewtonFailure

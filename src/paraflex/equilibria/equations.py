@@ -28,7 +28,7 @@ from paraflex.dynamics.signals import acting_loads
 from paraflex.dynamics.sparse import Saddle, stiffness_diagonal, without_stiffness
 from paraflex.dynamics.stiffness import RestingForces
 from paraflex.dynamics.tangents import MotionPoint, Tangency, rows_of
-from paraflex.equilibria.given import Conditions, Coordinate
+from paraflex.equilibria.conditions import Conditions, Coordinate
 from paraflex.kernel.packed import CONSTRAINT
 from paraflex.linear.coordinates import Coordinates, unit_in, with_coordinates
 from paraflex.linear.independent import independent_dense, independent_sparse
@@ -77,20 +77,20 @@ class Equations:
         System of the mechanism.
     start : State
         State from whose pose changes of coordinates count; loads in time have their values at its time.
-    given : Conditions
+    conditions : Conditions
         Coordinates held, moved, loaded and measured.
     """
 
     system: System
     start: State
-    given: Conditions
+    conditions: Conditions
 
     @cached_property
     def extended(self) -> System:
         """System with a row for every named coordinate."""
         cut = self.system.mechanism.cut
         joints, pins = [], {}
-        for one in self.given.coordinates:
+        for one in self.conditions.coordinates:
             if one.point is not None:
                 pins[_pin(one.point)] = one.point if cut is None else cut.points.get(one.point, one.point)
             if one.point is None or one.axis == "angle":
@@ -107,36 +107,36 @@ class Equations:
     def number(self) -> dict[Coordinate, int]:
         """Row of every named coordinate in the extended system."""
         mechanism, names = self.extended.mechanism, {name: k for k, name in enumerate(self.extended.rows)}
-        law = {one.joint: one.name for one in mechanism.prescribed}
+        motion_of = {one.joint: one.name for one in mechanism.prescribed}
         numbers = {}
-        for one in self.given.coordinates:
+        for one in self.conditions.coordinates:
             joint = one.name if one.point is None else _pin(one.point)
             if one.point is not None and one.axis != "angle":
                 numbers[one] = names[f"{joint} {one.axis}"]
             else:
-                numbers[one] = names[f"{law[joint]} {coordinate_kind(mechanism.joint(joint))}"]
+                numbers[one] = names[f"{motion_of[joint]} {coordinate_kind(mechanism.joint(joint))}"]
         return numbers
 
     @cached_property
     def holding(self) -> NDArray[np.int64]:
         """Rows that keep their value or follow a change: constraints, and coordinates held or moved."""
         own = [k for k in self.own.tolist() if self.extended.packed.rows["kind"][k] == CONSTRAINT]
-        extra = [self.number[one] for one in (*self.given.held, *self.given.moved)]
+        extra = [self.number[one] for one in (*self.conditions.held, *self.conditions.moved)]
         return np.array(list(dict.fromkeys([*own, *extra])), dtype=int)
 
     @cached_property
     def change(self) -> Array:
         """Change (rows,) of the rows `holding` at load fraction one."""
         change, place = np.zeros(self.holding.size), {row: k for k, row in enumerate(self.holding.tolist())}
-        for one, value in self.given.moved.items():
+        for one, value in self.conditions.moved.items():
             change[place[self.number[one]]] = value
         return change
 
     @cached_property
     def _loaded(self) -> tuple[NDArray[np.int64], Array]:
         """Rows at which forces act, and the forces."""
-        rows = np.array([self.number[one] for one in self.given.loads], dtype=int)
-        return rows, np.array(list(self.given.loads.values()), dtype=float)
+        rows = np.array([self.number[one] for one in self.conditions.loads], dtype=int)
+        return rows, np.array(list(self.conditions.loads.values()), dtype=float)
 
     @cached_property
     def _forces(self) -> RestingForces:
@@ -196,8 +196,8 @@ class Equations:
         point = MotionPoint(self.start.time, at.q, still, still, self.multipliers(at), self._forces.torques)
         found = self._tangency.at(point)
         rows, efforts = self._loaded
-        held, loaded = (rows_of(np.searchsorted(found.rows, wanted), found.jacobian)[0]
-                        for wanted in (self.holding, rows))  # fmt: skip
+        held, loaded = (rows_of(np.searchsorted(found.rows, selected), found.jacobian)[0]
+                        for selected in (self.holding, rows))  # fmt: skip
         stiffness = csr_matrix(found.stiffness + scipy.sparse.diags(self.elastic))
         return Matrices(stiffness, held, -(loaded.T @ efforts), found.mass)
 
@@ -222,7 +222,7 @@ class Equations:
 
     def dependent_travels(self, at: Unknowns) -> list[Coordinate]:
         """Return the moved coordinates that follow, at a point, from constraints and other held or moved ones."""
-        rows, moved = self.matrices(at).rows, list(self.given.moved)
+        rows, moved = self.matrices(at).rows, list(self.conditions.moved)
         kept = self.holding.size - len(moved)
         free = self.independent(csr_matrix(rows[:kept]), csr_matrix(rows[kept:]))[1] if moved else ()
         return [one for k, one in enumerate(moved) if k not in free]

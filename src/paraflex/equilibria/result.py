@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from paraflex.arguments import checked_arguments, given_as
+from paraflex.arguments import checked_arguments, named_in_errors
 from paraflex.arrays import Array
 from paraflex.display import Shown
 from paraflex.dynamics import System
@@ -17,15 +17,15 @@ from paraflex.dynamics.points import point_motion
 from paraflex.dynamics.rank import NO_PART, Dependence, dependence
 from paraflex.dynamics.sparse import stiffness_diagonal
 from paraflex.equilibria.branch import Point
+from paraflex.equilibria.conditions import Coordinate
 from paraflex.equilibria.equations import Equations
-from paraflex.equilibria.given import Coordinate
 from paraflex.equilibria.stability import Buckling, Vibrations
 from paraflex.errors import InputError, suggestion
 from paraflex.findings import Finding
 from paraflex.integrators import Solution
 from paraflex.kernel.packed import SPRING
 from paraflex.mechanism.quantities import known
-from paraflex.validity import Validity, assess, doubtful_stresses, shared_loads
+from paraflex.validity import Validity, assess, implausible_stresses, shared_loads
 
 
 @dataclass(frozen=True)
@@ -52,7 +52,7 @@ class Equilibrium:
     stiffness: Array
 
 
-@given_as("equilibria", "the equilibria that statics returns")
+@named_in_errors("equilibria", "the equilibria that statics returns")
 @dataclass(frozen=True)
 class Statics(Shown):
     """Equilibria along a branch, in its order: the start, the steps, limit points between them.
@@ -82,12 +82,12 @@ class Statics(Shown):
     @property
     def coordinates(self) -> tuple[Coordinate, ...]:
         """All named coordinates: moved, loaded, measured, held."""
-        return self.equations.given.coordinates
+        return self.equations.conditions.coordinates
 
     @property
     def directions(self) -> tuple[Coordinate, ...]:
         """Coordinates with a stiffness."""
-        return self.equations.given.measured
+        return self.equations.conditions.measured
 
     @property
     def fraction(self) -> Array:
@@ -205,9 +205,9 @@ class Statics(Shown):
         return assess(self.equations.extended, self.solution)
 
     @cached_property
-    def doubts(self) -> tuple[Finding, ...]:
+    def findings(self) -> tuple[Finding, ...]:
         """Findings: unstable equilibria with their growing motion, stresses beyond the strength, undetermined loads."""
-        of_loads = (doubtful_stresses, shared_loads)
+        of_loads = (implausible_stresses, shared_loads)
         stresses = tuple(one for of in of_loads for one in of(self.equations.extended, self.solution))
         unstable = np.flatnonzero(~self.stable & ~self.limit)
         if not unstable.size:

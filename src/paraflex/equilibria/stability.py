@@ -13,8 +13,8 @@ from paraflex.arrays import Array
 from paraflex.dynamics.linearise import DENSE_COORDINATES, LOWEST, admissible, all_modes, slowest, typical_square
 from paraflex.dynamics.sparse import Saddle, solved
 from paraflex.equilibria.branch import Point
+from paraflex.equilibria.conditions import Coordinate
 from paraflex.equilibria.equations import Equations, Matrices, Unknowns
-from paraflex.equilibria.given import Coordinate
 
 # Step of finite differences along the branch: motion of links [sizes of the mechanism, rad] and change of fraction.
 _MOVE, _FRACTION = 1e-4, 1e-2
@@ -195,11 +195,11 @@ def stiffness(equations: Equations, at: Unknowns, found: Matrices, directions: S
     Held and moved coordinates are kept, except the coordinate itself.
     """
     n = equations.system.n
-    wanted = equations.rows_named(directions, at.q)
+    selected = equations.rows_named(directions, at.q)
     out = np.zeros(len(directions))
     for k, one in enumerate(directions):
         others = np.nonzero(equations.holding != equations.number[one])[0]
-        rows, row = csr_matrix(found.rows[others]), csr_matrix(wanted[k])
+        rows, row = csr_matrix(found.rows[others]), csr_matrix(selected[k])
         kept, free = equations.independent(rows, row)
         if not free.size:
             out[k] = np.inf

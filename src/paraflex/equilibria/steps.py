@@ -11,8 +11,8 @@ from scipy.sparse import csr_matrix
 from paraflex.arguments import checked_arguments
 from paraflex.dynamics import State, pose_at_rest, standing_system
 from paraflex.equilibria.branch import Branch, Point
+from paraflex.equilibria.conditions import ModelWithStatics, StaticsDefaults, conditions
 from paraflex.equilibria.equations import Equations
-from paraflex.equilibria.given import ModelWithStatics, StaticsDefaults, conditions
 from paraflex.equilibria.result import Equilibrium, Statics
 from paraflex.equilibria.stability import buckling as buckling_about, checked, stiffness as stiffness_at, vibrations
 from paraflex.errors import EquilibriumError, ResultWarning
@@ -75,7 +75,7 @@ def statics(
     start : Start or State, optional
         Pose from which changes count, if nothing else deflects it; by default the model's start, or the assembly.
     warning : bool
-        Whether a doubtful result issues warnings; its `validity` and `doubts` hold them in either case.
+        Whether a doubtful result issues warnings; its `validity` and `findings` hold them in either case.
 
     Returns
     -------
@@ -98,60 +98,62 @@ def statics(
     LimitPointError
         No equilibrium of the branch carries the given loads; the error carries the `Statics` up to there.
     """
-    mechanism = Mechanism.made_of(source)
+    mechanism = Mechanism.from_source(source)
     own, begin = (StaticsDefaults(), None) if isinstance(source, Mechanism) else (source.statics, source.start)
-    asked = own.filled(
+    requested = own.filled(
         loads=loads, torques=torques, moved=moved, held=held, steps=steps, stiffness=stiffness, buckling=buckling
     )
-    result = _followed(mechanism, asked, begin if start is None else start, assembly)
+    result = _followed(mechanism, requested, begin if start is None else start, assembly)
     if warning:
         warn(result.validity)
-        warn_of(result.doubts, ResultWarning)
+        warn_of(result.findings, ResultWarning)
     return result
 
 
 @solvable("equilibria")
 def _followed(
-    mechanism: Mechanism, asked: StaticsDefaults, start: Start | State | None, assembly: str | None
+    mechanism: Mechanism, requested: StaticsDefaults, start: Start | State | None, assembly: str | None
 ) -> Statics:
     """Return the equilibria; an error carries those found before it."""
-    given = conditions(mechanism, asked)
+    given = conditions(mechanism, requested)
     system = standing_system(mechanism, start, assembly)
     equations = Equations(system, pose_at_rest(system, start, assembly), given)
     found: list[Equilibrium] = []
     branch = Branch(equations)
     try:
         first = branch.first()
-        found.append(_equilibrium(equations, first, asked.buckling))
+        found.append(_equilibrium(equations, first, requested.buckling))
         if given.moved or given.loads:
-            for point in branch.follow(first, asked.steps):
-                found.append(_equilibrium(equations, point, asked.buckling))
+            for point in branch.follow(first, requested.steps):
+                found.append(_equilibrium(equations, point, requested.buckling))
     except EquilibriumError as error:
-        error.partial = Statics(equations, _checked(found, [], asked), "failed", str(error)) if found else None
+        error.partial = Statics(equations, _checked(found, [], requested), "failed", str(error)) if found else None
         raise
-    return Statics(equations, _checked(found, _limit_beyond(branch, found, asked), asked))
+    return Statics(equations, _checked(found, _limit_beyond(branch, found, requested), requested))
 
 
 def _equilibrium(equations: Equations, point: Point, buckling: int) -> Equilibrium:
     found = equations.matrices(point.at)
     vibration = free = vibrations(equations, found)
-    if equations.given.moved:
-        moved = [equations.number[one] for one in equations.given.moved]
+    if equations.conditions.moved:
+        moved = [equations.number[one] for one in equations.conditions.moved]
         kept = np.flatnonzero(~np.isin(equations.holding, moved))
         free = vibrations(equations, found._replace(rows=csr_matrix(found.rows[kept])))
     return Equilibrium(
         point, vibration, free, buckling_about(equations, point, found, vibration, buckling),
-        stiffness_at(equations, point.at, found, equations.given.measured),
+        stiffness_at(equations, point.at, found, equations.conditions.measured),
     )  # fmt: skip
 
 
-def _checked(found: list[Equilibrium], beyond: list[Equilibrium], asked: StaticsDefaults) -> tuple[Equilibrium, ...]:
+def _checked(
+    found: list[Equilibrium], beyond: list[Equilibrium], requested: StaticsDefaults
+) -> tuple[Equilibrium, ...]:
     """Return the equilibria with buckling factors that the branch, there and beyond, does not contradict."""
     seen = [(one.point, one.vibrations, one.buckling) for one in (*found, *beyond)]
-    return tuple(replace(one, buckling=checked(seen[k:], asked.buckling)) for k, one in enumerate(found))
+    return tuple(replace(one, buckling=checked(seen[k:], requested.buckling)) for k, one in enumerate(found))
 
 
-def _limit_beyond(branch: Branch, found: list[Equilibrium], asked: StaticsDefaults) -> list[Equilibrium]:
+def _limit_beyond(branch: Branch, found: list[Equilibrium], requested: StaticsDefaults) -> list[Equilibrium]:
     """Return the limit point beyond the given loads, if the last equilibrium is estimated to buckle and it is near."""
     last = found[-1]
     begun, ended = (float(np.min(one.buckling.factors[:1], initial=np.inf)) for one in (found[0], last))
@@ -160,9 +162,9 @@ def _limit_beyond(branch: Branch, found: list[Equilibrium], asked: StaticsDefaul
     if not (last.vibrations.stable and 1.0 + _NEAR < estimate < np.inf):
         return []
     try:
-        for point in branch.follow(last.point, asked.steps, min(estimate, furthest)):
+        for point in branch.follow(last.point, requested.steps, min(estimate, furthest)):
             if point.limit:
-                return [_equilibrium(branch.equations, point, asked.buckling)]
+                return [_equilibrium(branch.equations, point, requested.buckling)]
     except EquilibriumError:
         pass
     return []

@@ -17,13 +17,13 @@ from paraflex.figures.selection import names_of
 from paraflex.figures.tables import Column, Table
 from paraflex.formatting import NO_VALUE, ROUNDING, number, quantity, text_symbol
 from paraflex.results.controllers import (
+    APPLIED,
     CONTROLLERS,
-    GIVEN,
     INPUT,
     OUTPUT,
     READINGS,
+    REQUESTED,
     SAMPLE,
-    WANTED,
     ControllerData,
     controllers_of,
 )
@@ -46,7 +46,7 @@ def controllers(data: xr.Dataset) -> Iterator[Chart]:
     dotted. A dashed line is a limit that a torque reaches.
     """
     for one in controllers_of(data):
-        for dim, variable in ((OUTPUT, GIVEN), (INPUT, READINGS)):
+        for dim, variable in ((OUTPUT, APPLIED), (INPUT, READINGS)):
             values = one.data[variable].transpose("mode", dim, SAMPLE).values
             # A mode lacks the signals of motors that it does not drive.
             known = [k for k in range(values.shape[1]) if np.isfinite(values[:, k]).any()]
@@ -70,7 +70,7 @@ def _signals(one: ControllerData, dim: str, values: Array, own: Sequence[int], a
     curves = [held(text_symbol(names[own[p]]), r, p, from_delay, values[r, p]) for r, p in known]
     if dim == INPUT:
         return Chart(f"readings-{one.name}", f"Controller {one.name}: readings", axis, curves)
-    wanted = one.data[WANTED].transpose("mode", OUTPUT, SAMPLE).values
+    wanted = one.data[REQUESTED].transpose("mode", OUTPUT, SAMPLE).values
     curves += [
         held("wanted by the law", r, p, times, wanted[r, own[p]], look=look(p)._replace(dash=DOTTED), desired=True,
              quiet=True) for r, p in known

@@ -25,7 +25,7 @@ from paraflex.seals import damaged
 Array = NDArray[np.float64]
 
 # Metrics by which designs are not chosen: those of the solver, and those for which smaller is not always better.
-_NOT_JUDGED = tuple(metric.name for metric in METRICS.values() if metric.of_solver or not metric.judged)
+_NOT_JUDGED = tuple(metric.name for metric in METRICS.values() if metric.of_solver or not metric.ranked)
 _OF_SOLVER = tuple(metric.name for metric in METRICS.values() if metric.of_solver)
 _OF_MEMBERS = tuple(f"{metric.name}." for metric in METRICS.values() if metric.each in (MOTOR, JOINT))
 _OF_A_RUN = ("run", "design", "path", "mode", "status", "reason")

@@ -8,7 +8,7 @@ import numpy as np
 import xarray as xr
 
 from paraflex.figures.catalogue import figure
-from paraflex.figures.charts import Array, Axis, Chart, Curve, is_wide, look
+from paraflex.figures.charts import Array, Axis, Chart, Curve, Mark, is_wide, look
 from paraflex.figures.selection import names_of
 from paraflex.figures.tables import Column, Table
 from paraflex.results.metrics import METRICS, VALIDITY, metric_label
@@ -17,7 +17,7 @@ from paraflex.units import DisplayUnit
 # Metrics shown first; others fill the remaining panels.
 _FIRST = ("tracking_rms_motion", "tracking_rms", "residual_vibration", "peak_torque_max")
 _PANELS = 3
-_MARKS = ("dot", "square", "triangle", "diamond")
+_MARKS: tuple[Mark, ...] = ("dot", "square", "triangle", "diamond")
 # Share of a law's line over which its modes are spread.
 _BAND = 0.6
 # Internal torques below this share of the peak torque are rounding errors.
@@ -73,7 +73,7 @@ def metrics_of(data: xr.Dataset) -> tuple[str, ...]:
     return tuple(str(name) for name in data.data_vars if str(name).partition(".")[0] in METRICS)
 
 
-def law_table(data: xr.Dataset) -> Table:
+def profile_table(data: xr.Dataset) -> Table:
     """Return the table of all metrics, with a row for each law in each mode."""
     laws, modes = names_of(data, "law"), names_of(data, "mode")
     status = data["status"].transpose("mode", "law").values.ravel()

@@ -17,7 +17,7 @@ from paraflex.figures.tables import Cell, Column, Table
 from paraflex.formatting import display_unit, number, quantity, text_symbol
 from paraflex.results.following import HEADLINE, ErrorSpan
 from paraflex.results.linear_summary import HELD_WORDS, HOLDINGS
-from paraflex.results.reduced_runs import COUNTS, DISTANCE, FULL as OF_FULL, reduction_figures
+from paraflex.results.reduced_runs import COUNTS, DISTANCE, FULL as OF_FULL, reduced_run_figures
 from paraflex.results.reduction_summary import FULL, OWN, STATIC, along_summary
 
 _ERRORS, _BASES = "Responses and errors", "Bases of other poses"
@@ -255,7 +255,7 @@ def reduced_runs(data: xr.Dataset) -> Iterator[Table]:
     runs = [data.isel(mode=r) for r in range(data.sizes["mode"])] if error else [data]
     names = names_of(data, "mode") if error else ["run"]
     numbers = [
-        {name: float(run[name]) for name in (error, "wall_time") if name} | reduction_figures(run) for run in runs
+        {name: float(run[name]) for name in (error, "wall_time") if name} | reduced_run_figures(run) for run in runs
     ]
     yield reduced_runs_table(
         ["mode" if error else ""], [([n], one) for n, one in zip(names, numbers, strict=True)], error

@@ -8,7 +8,7 @@ import numpy as np
 import xarray as xr
 
 from paraflex.errors import InputError
-from paraflex.formatting import is_signs, peak
+from paraflex.formatting import is_signs
 
 # Ratio of speeds along the two axes below which the end-effector is at rest along one of them, up to rounding.
 _STILL = 1e-9
@@ -98,11 +98,6 @@ def of_point(run: xr.Dataset, point: str | None) -> xr.Dataset:
     return run.drop_vars([f"{name}_desired" for name in moved if f"{name}_desired" in run]).assign(moved)
 
 
-def run_label(run: xr.Dataset) -> str:
-    """Return the legend label of a run's mode."""
-    return f"mode {run['mode'].item()}"
-
-
 def samples(run: xr.Dataset) -> int:
     """Return the number of samples that a run reached."""
     moving = run["end_effector"] if "end_effector" in run else run["angle"]
@@ -129,20 +124,3 @@ def as_runs(data: xr.Dataset, mode: str | None = None) -> xr.Dataset:
     if mode is not None:
         data = data.isel(mode=[place_of(mode, names_of(data, "mode"), "mode")])
     return data.transpose("mode", "time", ...)
-
-
-def most_deflected(run: xr.Dataset) -> list[str]:
-    """Return the two bodies with the largest transverse tip displacements, in the order of the mechanism.
-
-    Twins of a symmetric mechanism are counted once, unless there are no others.
-    """
-    peaks = {str(name): peak(run["tip_transverse"].sel(body=name)) for name in run["body"].values}
-    chosen: list[str] = []
-    rest = dict(peaks)
-    while rest and len(chosen) < 2:
-        alike = [name for name in rest if rest[name] >= _ALIKE * max(rest.values())]
-        chosen.append(alike[0])
-        rest = {name: value for name, value in rest.items() if name not in alike}
-    ranked = sorted((name for name in peaks if name not in chosen), key=lambda name: -peaks[name])
-    chosen += ranked[: 2 - len(chosen)]
-    return [name for name in peaks if name in chosen]

@@ -13,8 +13,9 @@ import xarray as xr
 from paraflex.errors import InputError
 from paraflex.figures.catalogue import figure
 from paraflex.figures.charts import Array, Axis, Chart, Curve, look
+from paraflex.figures.run_motion import most_deflected
 from paraflex.figures.runs import after_motion, round_magnification
-from paraflex.figures.selection import most_deflected, names_of
+from paraflex.figures.selection import names_of
 from paraflex.figures.tables import Column, Table
 from paraflex.formatting import peak, text_symbol
 
@@ -53,7 +54,8 @@ def model_distances(data: xr.Dataset) -> Iterator[Chart]:
         ("errors", "the desired position", data["end_effector_desired"]),
         ("apart", printed(reference), places.sel(model=reference, drop=True)),
     ):
-        away = np.sqrt(((places - other) ** 2).sum("axis", skipna=False)).transpose("mode", "model", "time").values
+        squares = ((places - other) ** 2).sum("axis", skipna=False).transpose("mode", "model", "time").values
+        away = np.sqrt(squares)
         curves = _by_model(data, np.where(away > _SMALLEST_DISTANCE, away, np.nan))
         yield Chart(identity, f"Distance from {title}", Axis("distance", "m", log=True), curves,
                     spans=after_motion(data))  # fmt: skip
@@ -157,7 +159,8 @@ def _of_parts(
 
 def _by_model(data: xr.Dataset, y: Array, x: Array | None = None, choice: int | None = None) -> list[Curve]:
     """Return the curves of values (modes, models, samples): those of all models in the mode of the selected run."""
-    known = np.isfinite(data["end_effector"].transpose("mode", "model", "time", "axis").values).all(axis=-1)
+    places = data["end_effector"].transpose("mode", "model", "time", "axis").values
+    known = np.isfinite(places).all(axis=-1, keepdims=True)[..., 0]
     models = names_of(data, "model")
     return [
         Curve(

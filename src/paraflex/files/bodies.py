@@ -8,7 +8,7 @@ from typing import Any
 
 from paraflex.errors import InputError
 from paraflex.fem import ReferenceCondition
-from paraflex.files.said import check_fields
+from paraflex.files.field_values import check_fields
 from paraflex.files.schema import (
     AssumedModesTable,
     BeamTable,
@@ -22,7 +22,7 @@ from paraflex.limits import SHAPE_FUNCTIONS, at_most
 from paraflex.mechanism import (
     AssumedModesBeam,
     Body,
-    BodyReduction,
+    ComponentModes,
     Curvature,
     Damping,
     FlexibleBeam,
@@ -90,7 +90,7 @@ def read_body(name: str, body: BeamTable | RigidTable | AssumedModesTable | Moda
         damping=_damping(body.damping, name),
         flexible=body.flexible,
         frames=body.frames,
-        reduction=BodyReduction(body.reduction),
+        reduction=ComponentModes(body.reduction),
     )
 
 
@@ -112,12 +112,12 @@ def read_section(name: str, table: SectionTable) -> Section:
         raise InputError("is missing", field=f"section.{name}.shape", remedy='write "round" or "tube"')
     if kind is None and not given.keys() & {"area", "second_moment"}:
         kind = "rectangle"
-    made: Any = Section if kind is None else SHAPES[kind]
-    own = {each.name: each for each in fields(made) if each.name != "shape"}
+    section_type: Any = Section if kind is None else SHAPES[kind]
+    own = {each.name: each for each in fields(section_type) if each.name != "shape"}
     what, described = "section by its area" if kind is None else f"{kind} section", SectionTable.model_fields
     check_fields(given, own, what, f"section.{name}", lambda each: f"{described[each.name].description}")
     try:
-        return Section(**given) if kind is None else Section.of(made(**given))
+        return Section(**given) if kind is None else Section.of(section_type(**given))
     except InputError as error:
         raise error.at(f"section.{name}.{error.field.rpartition('.')[2]}") from None
 

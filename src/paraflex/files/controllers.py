@@ -12,8 +12,8 @@ from paraflex.control.laws.described import TABLE, ControllerDescription, check_
 from paraflex.control.laws.kinds import LAWS
 from paraflex.errors import InputError, renamed, within
 from paraflex.files.expressions import evaluate_parameters
-from paraflex.files.laws import components_table, read_components
-from paraflex.files.said import fields_said, unsayable
+from paraflex.files.field_values import changed_fields, inexpressible
+from paraflex.files.profiles import components_table, read_components
 from paraflex.files.schema import ModelTable, TorqueTable
 from paraflex.mechanism import Mechanism
 
@@ -58,17 +58,17 @@ def controller_table(one: ControllerDescription) -> dict[str, Any]:
     """
     law, place = one.law, f"{TABLE}.{one.name}"
     if LAWS.get(law.kind) is not type(law):
-        raise unsayable(f"{place}.law", type(law).__name__, f"give a law of type {', '.join(LAWS)}")
+        raise inexpressible(f"{place}.law", type(law).__name__, f"give a law of type {', '.join(LAWS)}")
     for each in fields(law):
         given = getattr(law, each.name)
         if each.metadata.get("by") and isinstance(given, Sequence | np.ndarray):
-            raise unsayable(f"{place}.{each.name}", given, "give one number, or numbers by name")
-    said = {"type": law.kind} | fields_said(law) | fields_said(one, "name", "law")
+            raise inexpressible(f"{place}.{each.name}", given, "give one number, or numbers by name")
+    said = {"type": law.kind} | changed_fields(law) | changed_fields(one, "name", "law")
     if isinstance(one.reference, Mapping):
         try:
             said["reference"] = {sensor: components_table((each,), "torque")["torque"]
                                  for sensor, each in one.reference.items()}  # fmt: skip
         except (InputError, KeyError):
-            raise unsayable(f"{place}.reference", dict(one.reference),
+            raise inexpressible(f"{place}.reference", dict(one.reference),
                             "give numbers or expressions of the time") from None  # fmt: skip
     return said

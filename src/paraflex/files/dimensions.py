@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 from paraflex.files.expressions import CONSTANTS, ExpressionError, expressed_in, tree_of
-from paraflex.units import ANGLE, PLAIN, Dimension, spelt, unit_named
+from paraflex.units import ANGLE, PLAIN, Dimension, dimension_text, unit_named
 
 # Function from a name to its dimension; None where it is unknown, as for the time or a parameter without a unit.
 _Of = Callable[[str], Dimension | None]
@@ -84,7 +84,9 @@ def _of_sum(one: Dimension | None, other: Dimension | None) -> Dimension | None:
             (each for each in (one, other) if each not in (None, PLAIN)), None if None in (one, other) else PLAIN
         )
     if one != other:
-        raise ExpressionError(f"a sum of quantities in {spelt(one)} and in {spelt(other)}", "check their units")
+        raise ExpressionError(
+            f"a sum of quantities in {dimension_text(one)} and in {dimension_text(other)}", "check their units"
+        )
     return one
 
 
@@ -109,6 +111,6 @@ def _of_function(name: str, given: Dimension | None) -> Dimension | None:
     if name == "sqrt":
         return tuple(each // 2 for each in given) if not any(each % 2 for each in given) else None  # type: ignore[return-value]
     raise ExpressionError(
-        f"{name} of a quantity in {spelt(given)}",
+        f"{name} of a quantity in {dimension_text(given)}",
         f"write * between a number and a name; {name} takes a number or an angle",
     )

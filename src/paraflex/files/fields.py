@@ -13,7 +13,7 @@ from paraflex.errors import InputError
 from paraflex.files.dimensions import dimension_of, dimensions_of_parameters
 from paraflex.files.expressions import ExpressionError, evaluate, expressed_in, names_in
 from paraflex.mechanism import JOINT_KINDS
-from paraflex.units import FIELD_UNITS, PLAIN, WHERE_IT_SLIDES, Dimension, quantities_in, spelt, unit_named
+from paraflex.units import FIELD_UNITS, PLAIN, WHERE_IT_SLIDES, Dimension, dimension_text, quantities_in, unit_named
 
 # Path to a value in parsed TOML: keys of tables and indices of lists.
 Place = tuple[str | int, ...]
@@ -141,14 +141,16 @@ def check_unit(
         given = dimension_of(text, parameters)
     if units is None or given in (None, PLAIN) or given in [unit_named(unit).dimension for unit in units]:
         return
-    asked = f"one in {' or '.join(units)}" if units else "a number without a unit"
+    expected = f"one in {' or '.join(units)}" if units else "a number without a unit"
     remedy = f"give {description}"
     if named := sorted(names_in(text) & parameters.keys()):
         remedy += f"; it depends on {', '.join(f'parameters.{name}' for name in named)}"
     # The dimensions differ in the angle only, as for a period computed from a speed, 2 * pi / n.
     if any(given[:3] == unit_named(unit).dimension[:3] for unit in units or ()):
         remedy += '; an angle has a dimension of its own: the period of a speed n in rpm is "1 rev / n"'
-    raise InputError(f"a quantity in {spelt(given)} where {asked} is asked for", field=field, value=text, remedy=remedy)
+    raise InputError(
+        f"a quantity in {dimension_text(given)} where {expected} is asked for", field=field, value=text, remedy=remedy
+    )
 
 
 def number_in(text: str, unit: str) -> float:

@@ -11,8 +11,8 @@ from paraflex.control.shaping.shapers import Shaper, ShaperKind
 from paraflex.errors import InputError, within
 from paraflex.files.bodies import read_body, read_section
 from paraflex.files.expressions import evaluate_parameters
-from paraflex.files.laws import quantities, read_components, read_law
-from paraflex.files.said import check_fields
+from paraflex.files.field_values import check_fields
+from paraflex.files.profiles import quantities, read_components, read_profile
 from paraflex.files.schema import (
     JointTable,
     ModelTable,
@@ -67,15 +67,15 @@ def read_mechanism(table: ModelTable) -> Mechanism:
     for name, section in table.section.items():
         read_section(name, section)
     effector = table.end_effector
-    made: dict[str, Any] = {
+    members: dict[str, Any] = {
         key: getattr(table, key) for key in ("name", "description", "geometry", "ground", "gravity")
     }
     for field, group in groups_of(Mechanism).items():
         if group.kinds:
             make = _load if group.table == "load" else _member
-            made[field] = [make(group, name, one, table) for name, one in getattr(table, group.table).items()]
+            members[field] = [make(group, name, one, table) for name, one in getattr(table, group.table).items()]
     mechanism = Mechanism(
-        **made,
+        **members,
         bodies=tuple(read_body(name, body, table) for name, body in table.body.items()),
         joints=tuple(_joint(name, entry) for name, entry in table.joint.items()),
         motors=tuple(Motor(name, joint) for name, joint in table.motor.items()),
@@ -104,13 +104,13 @@ def _joint(name: str, entry: list[str] | JointTable) -> Joint:
 
 def _prescribed(table: ModelTable) -> tuple[PrescribedAngle, ...]:
     parameters = evaluate_parameters(table.parameters)
-    made = []
+    found = []
     for name, entry in table.prescribed.items():
         _check_quantity(name, entry, table.joint.get(entry.joint))
         with within(f"prescribed.{name}"):
-            law = read_law(entry, parameters, table.study.duration)
-        made.append(PrescribedAngle(name, entry.joint, law))
-    return tuple(made)
+            profile = read_profile(entry, parameters, table.study.duration)
+        found.append(PrescribedAngle(name, entry.joint, profile))
+    return tuple(found)
 
 
 def _check_quantity(name: str, entry: PrescribedTable, joint: list[str] | JointTable | None) -> None:
@@ -154,11 +154,11 @@ def read_torques(table: ModelTable) -> dict[str, InTime]:
 
 def _member(group: Group, name: str, entry: Any, _: ModelTable) -> Any:
     """Build a member of a group from its table."""
-    said = dict(entry)
+    values = dict(entry)
     kinds = {getattr(kind, "kind", None): kind for kind in group.kinds}
-    kind = kinds[said.pop("type")] if "type" in said else group.kinds[0]
-    points = [PointRef.parse(point, f"{group.table}.{name}.points") for point in said.pop("points", ())]
-    return kind(name, *points, *said.pop("joints", ()), **said)
+    kind = kinds[values.pop("type")] if "type" in values else group.kinds[0]
+    points = [PointRef.parse(point, f"{group.table}.{name}.points") for point in values.pop("points", ())]
+    return kind(name, *points, *values.pop("joints", ()), **values)
 
 
 def read_paths(tables: Mapping[str, PathTable]) -> dict[str, Path]:
@@ -185,21 +185,21 @@ def read_path(table: PathTable, others: Mapping[str, Path] | None = None) -> Pat
     InputError
         Invalid numbers, or unknown names.
     """
-    said = {name: value for name, value in table if name not in ("type", "shaper")}
+    values = {name: value for name, value in table if name not in ("type", "shaper")}
     if isinstance(table, SequenceTable):
         for name in table.paths:
             known(name, others or {}, "paths", "path")
-        said["paths"] = tuple((others or {})[name] for name in table.paths)
+        values["paths"] = tuple((others or {})[name] for name in table.paths)
     if isinstance(table, TabulatedPathTable):
-        rows = said.pop("table")
+        rows = values.pop("table")
         if len({len(row) for row in rows}) > 1:
             raise InputError(
                 "some points have a time and some do not", field="table", remedy="give all as [x, y], or as [x, y, t]"
             )
-        said["points"] = [row[:2] for row in rows]
-        said["times"] = [row[2] for row in rows] if rows and len(rows[0]) > 2 else None
+        values["points"] = [row[:2] for row in rows]
+        values["times"] = [row[2] for row in rows] if rows and len(rows[0]) > 2 else None
     try:
-        path = PATHS[table.type](**said)
+        path = PATHS[table.type](**values)
     except InputError as error:
         at_table = isinstance(table, TabulatedPathTable) and error.field in ("points", "times")
         raise (error.at("table") if at_table else error) from None
@@ -214,6 +214,6 @@ def read_shaper(table: ShaperTable) -> Shaper:
     InputError
         Invalid numbers.
     """
-    said = {name: value for name, value in table if name != "type" and value is not None}
+    values = {name: value for name, value in table if name != "type" and value is not None}
     with within("shaper"):
-        return Shaper(ShaperKind(table.type), **said)
+        return Shaper(ShaperKind(table.type), **values)

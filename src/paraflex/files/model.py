@@ -7,12 +7,13 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path as FilePath
 from typing import Any
 
-from paraflex.arguments import CheckedFields, checked_arguments, given_as
+from paraflex.arguments import CheckedFields, checked_arguments, named_in_errors
 from paraflex.control.laws.described import NONE, ControllerDescription, check_together
 from paraflex.control.shaping.shaped import shape_torques
-from paraflex.equilibria.given import StaticsDefaults, conditions
+from paraflex.equilibria.conditions import StaticsDefaults, conditions
 from paraflex.errors import InputError, renamed, suggestion, within
 from paraflex.files.controllers import read_controllers
+from paraflex.files.field_values import inexpressible
 from paraflex.files.generators import generated_text, generator_names, is_generated
 from paraflex.files.library import library_file, library_names
 from paraflex.files.mechanism import read_mechanism, read_path, read_paths, read_shaper, read_torques
@@ -20,7 +21,6 @@ from paraflex.files.merge import merged, same
 from paraflex.files.overlay import plain, with_values
 from paraflex.files.read import exists, naming, parse_toml, read_text, read_toml, validate
 from paraflex.files.rows import with_names, with_rows
-from paraflex.files.said import unsayable
 from paraflex.files.schema import ModelTable, PathFile
 from paraflex.files.start import read_start
 from paraflex.files.study import StudyDefaults, check_study
@@ -31,11 +31,11 @@ from paraflex.late import save_file
 from paraflex.mechanism import ActuationMode, Mechanism, Start, parse_mode, standing
 from paraflex.mechanism.quantities import known
 from paraflex.tracking import Ending, TrackingTask, plan_tracking
-from paraflex.validity import doubtful_numbers
+from paraflex.validity import implausible_numbers
 from paraflex.writing import write_text
 
 
-@given_as("a model", "the model that paraflex.load reads")
+@named_in_errors("a model", "the model that paraflex.load reads")
 @dataclass(frozen=True)
 class Model(CheckedFields):
     """Model: content of a model file, read from one or built in Python.
@@ -102,8 +102,8 @@ class Model(CheckedFields):
     @checked_arguments()
     def path_name(self, name: str | None = None) -> str:
         """Return the name of a path: the given name, that of the study, or that of the first path; see `path`."""
-        wanted = name or self.study.first_path or next(iter(self.paths), None)
-        if wanted is None:
+        chosen = name or self.study.first_path or next(iter(self.paths), None)
+        if chosen is None:
             raise InputError(
                 "the model has no path, which plans and studies need",
                 field="path",
@@ -111,10 +111,10 @@ class Model(CheckedFields):
                 "--set FIELD=VALUE of paraflex run, or pf.load(model, set={...}) and pf.simulate_motion in a loop",
                 source=self.source,
             )
-        if wanted not in self.paths:
-            remedy = suggestion(wanted, list(self.paths))
-            raise InputError("unknown path", field="path", value=wanted, remedy=remedy, source=self.source)
-        return wanted
+        if chosen not in self.paths:
+            remedy = suggestion(chosen, list(self.paths))
+            raise InputError("unknown path", field="path", value=chosen, remedy=remedy, source=self.source)
+        return chosen
 
     @checked_arguments()
     def modes(self, names: Sequence[str] = ()) -> tuple[ActuationMode, ...]:
@@ -125,8 +125,8 @@ class Model(CheckedFields):
         InputError
             Unknown mode.
         """
-        wanted = names or self.study.modes or [mode.name for mode in self.mechanism.modes]
-        return tuple(dict.fromkeys(parse_mode(self.mechanism, name) for name in wanted))
+        chosen = names or self.study.modes or [mode.name for mode in self.mechanism.modes]
+        return tuple(dict.fromkeys(parse_mode(self.mechanism, name) for name in chosen))
 
     @checked_arguments()
     def acting(self, names: Sequence[str] = ()) -> tuple[ControllerDescription, ...]:
@@ -138,19 +138,19 @@ class Model(CheckedFields):
             Unknown controller, "none" together with other names, sample periods that are not multiples of the shortest
             one, or two laws that each give the whole torque.
         """
-        wanted = list(dict.fromkeys(names or self.study.controllers))
-        if wanted == [NONE]:
+        chosen = list(dict.fromkeys(names or self.study.controllers))
+        if chosen == [NONE]:
             return ()
-        if NONE in wanted:
+        if NONE in chosen:
             raise InputError(
                 "cannot be combined with others",
                 field="controllers",
                 value=NONE,
                 remedy="give it alone, or leave it out",
             )
-        for name in wanted:
+        for name in chosen:
             known(name, self.controllers, "controllers", "controller")
-        found = tuple(self.controllers[name] for name in wanted)
+        found = tuple(self.controllers[name] for name in chosen)
         check_together(found)
         return found
 
@@ -297,14 +297,14 @@ def plan(
     InputError, AssemblyError, UnreachablePathError
         See `Model.plan` and `tracking.plan_tracking`.
     """
-    asked = {
+    settings = {
         "duration": duration, "samples": samples, "assembly": assembly, "orientation": orientation, "after": after,
         "warning": warning,
     }  # fmt: skip
     if isinstance(model, Mechanism):
-        given = {name: value for name, value in asked.items() if value is not None}
+        given = {name: value for name, value in settings.items() if value is not None}
         return plan_tracking(model, path, **given)  # type: ignore[arg-type]  # refused where it is no path
-    return (load(model) if isinstance(model, str) else model).plan(path, **asked)
+    return (load(model) if isinstance(model, str) else model).plan(path, **settings)
 
 
 @checked_arguments(name_or_file="give a name of library_names(), or a file")
@@ -330,7 +330,7 @@ def load(name_or_file: str | FilePath, *, set: Mapping[str, Any] | None = None) 
         Unknown name, unreadable file, or invalid entry. The error names file, field, value and remedy.
     """
     model = read_model(name_or_file, set or {})
-    warn_of(doubtful_numbers(model.mechanism, model.study.duration))
+    warn_of(implausible_numbers(model.mechanism, model.study.duration))
     return model
 
 
@@ -415,7 +415,7 @@ def load_path(file: str | FilePath) -> Path:
 def _model(table: ModelTable, data: dict[str, Any], source: str, text: str) -> Model:
     mechanism = read_mechanism(table)
     paths = read_paths(table.path)
-    said = dict(table.study) | {
+    values = dict(table.study) | {
         "paths": tuple(table.study.paths),
         "modes": tuple(table.study.modes),
         "orientation": table.study.orientation or 0.0,
@@ -423,8 +423,8 @@ def _model(table: ModelTable, data: dict[str, Any], source: str, text: str) -> M
         "controllers": tuple(table.study.controllers),
     }
     with within("study"):
-        said["shaper"] = None if table.study.shaper is None else read_shaper(table.study.shaper)
-    study = StudyDefaults(**said)
+        values["shaper"] = None if table.study.shaper is None else read_shaper(table.study.shaper)
+    study = StudyDefaults(**values)
     check_study(mechanism, paths, study)
     turns = mechanism.end_effector is not None and "angle" in mechanism.end_effector.coordinates
     if table.study.orientation is not None and not turns:
@@ -444,10 +444,10 @@ def _model(table: ModelTable, data: dict[str, Any], source: str, text: str) -> M
 
 
 def _statics(table: ModelTable, mechanism: Mechanism) -> StaticsDefaults:
-    said = dict(table.statics)
+    values = dict(table.statics)
     for name in ("held", "stiffness"):
-        said[name] = None if said[name] is None else tuple(said[name])
-    found = StaticsDefaults(**said)
+        values[name] = None if values[name] is None else tuple(values[name])
+    found = StaticsDefaults(**values)
     with within("statics"):
         conditions(mechanism, found)
     return found
@@ -463,10 +463,10 @@ def _data(model: Model) -> dict[str, Any]:
         data.pop("payload")
     for each in (False, True, True):
         found = model_from(data, model.source)
-        now, wanted = (model_tables(one, file=data, before=found.mechanism, each=each) for one in (found, model))
-        if same(now, wanted):
+        now, target = (model_tables(one, file=data, before=found.mechanism, each=each) for one in (found, model))
+        if same(now, target):
             return data
-        data = merged(data, now, wanted)
+        data = merged(data, now, target)
     return _checked(model, data)
 
 
@@ -484,8 +484,8 @@ def _checked(model: Model, data: dict[str, Any]) -> dict[str, Any]:
     InputError
         Data that describe another model.
     """
-    wanted, found = (model_tables(one) for one in (model, model_from(data, model.source)))
-    for key, value in wanted.items():
+    expected, found = (model_tables(one) for one in (model, model_from(data, model.source)))
+    for key, value in expected.items():
         if not same(value, found.get(key)):
-            raise unsayable(key, value, "build it from parts that a file can hold")
+            raise inexpressible(key, value, "build it from parts that a file can hold")
     return data

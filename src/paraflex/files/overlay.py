@@ -90,7 +90,7 @@ def _place_to_set(data: Mapping[str, Any], field: str) -> Place:
         if isinstance(_at(data, place), list) or not _may_have(data, place, part):
             raise InputError(
                 "no such field in the model's file", field=field,
-                remedy=_namesakes(data, part) or suggestion(_spelt((*place, part)), _known_below(data, place)),
+                remedy=_same_names(data, part) or suggestion(_spelt((*place, part)), _known_below(data, place)),
             )  # fmt: skip
         place = (*place, part)
     if isinstance(_at(data, place), dict):
@@ -116,7 +116,7 @@ def _known_below(data: Mapping[str, Any], place: Place) -> list[str]:
     return [_spelt((*place, key)) for key in dict.fromkeys([*there, *possible])]
 
 
-def _namesakes(data: Mapping[str, Any], name: str) -> str:
+def _same_names(data: Mapping[str, Any], name: str) -> str:
     """Suggest fields of that name in other tables, "did you mean section.bar.thickness?"; empty if there are none."""
     there = [_spelt(each) for each in number_places(data) if each[-1] == name]
     return f"did you mean {' or '.join(there[:3])}?" if there else ""

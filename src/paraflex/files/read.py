@@ -228,9 +228,9 @@ def _first_problem(schema: type[BaseModel], data: dict[str, Any], error: Validat
     if kind in ("union_tag_invalid", "union_tag_not_found"):
         return _tag_problem(_tags(schema, problem["loc"]), field, value)
     if kind == "expression":
-        said = problem.get("ctx", {})
-        remedy = f"give {description}; {said.get('remedy')}"
-        return InputError(said.get("problem", ""), field=field, value=value, remedy=remedy)
+        context = problem.get("ctx", {})
+        remedy = f"give {description}; {context.get('remedy')}"
+        return InputError(context.get("problem", ""), field=field, value=value, remedy=remedy)
     if kind in _NO_TABLE:
         return InputError("should be a table", field=field, value=value, remedy=f"give {description}")
     if kind == "literal_error":

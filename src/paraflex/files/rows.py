@@ -20,7 +20,7 @@ from paraflex.files.outside import check_outside, is_outside
 from paraflex.files.overlay import overlaid
 from paraflex.files.read import text_of
 from paraflex.files.schema import ModelTable, PathFile
-from paraflex.units import spelt, unit_named, unit_of, unknown_unit
+from paraflex.units import dimension_text, unit_named, unit_of, unknown_unit
 
 # Possible numbers of columns of a file, with their names and meanings in errors.
 _TWO, _THREE, _PATH = (2,), (3,), (2, 3)
@@ -37,7 +37,7 @@ _SQUARE_ANYWHERE = re.compile(r"\[([^\[\]]*)\]")
 _SQUARE, _ROUND = re.compile(r"\[([^\[\]]*)\]\W*$"), re.compile(r"\(([^()]*)\)\W*$")
 
 
-def with_rows(data: dict[str, Any], folder: Path, asked: Container[Any] = ()) -> dict[str, Any]:
+def with_rows(data: dict[str, Any], folder: Path, allowed: Container[Any] = ()) -> dict[str, Any]:
     """Replace the file names in a model's prescribed motions, loads, torques and paths by the rows of the files.
 
     Parameters
@@ -46,7 +46,7 @@ def with_rows(data: dict[str, Any], folder: Path, asked: Container[Any] = ()) ->
         Parsed data; not modified.
     folder : Path
         Folder of the model file, to which names are relative.
-    asked : container of values
+    allowed : container of values
         Values set by the user; absolute file names among them may lie outside the folder.
 
     Raises
@@ -61,7 +61,7 @@ def with_rows(data: dict[str, Any], folder: Path, asked: Container[Any] = ()) ->
     for place, entry, columns in _entries(data):
         file = entry.get("table")
         if isinstance(file, str):
-            if not (Path(file).is_absolute() and file in asked):
+            if not (Path(file).is_absolute() and file in allowed):
                 check_outside(folder, file, _field(place))
             entry["table"] = _read_rows(data, place, folder, file, columns)
     return data
@@ -163,11 +163,11 @@ def _in_si(data: dict[str, Any], place: Place, file: str, headings: str, rows: l
             _, remedy = unknown_unit(f"1 {text}") or ("", 'write units like "ms", "N m" or "deg"')
             raise InputError(f'{where} has the unknown unit "{text}"', field=field, value=heading, remedy=remedy)
         given = overlaid(data, [((*place, "table"), [[0.0] * len(found)])])
-        wanted = units_at(schema, given, (*place, "table", 0, k)) or ()
-        if unit.dimension not in [unit_named(one).dimension for one in wanted]:
+        units = units_at(schema, given, (*place, "table", 0, k)) or ()
+        if unit.dimension not in [unit_named(one).dimension for one in units]:
             raise InputError(
-                f"{where} is in {spelt(unit.dimension)} where {' or '.join(wanted)} is asked for", field=field,
-                value=heading, remedy=f"give it in {' or '.join(wanted)} or a multiple, or take another column",
+                f"{where} is in {dimension_text(unit.dimension)} where {' or '.join(units)} is asked for", field=field,
+                value=heading, remedy=f"give it in {' or '.join(units)} or a multiple, or take another column",
             )  # fmt: skip
         found[k] = [unit.in_si(repr(x)) if isfinite(x) else x for x in found[k]]
     return [list(row) for row in zip(*found, strict=True)]

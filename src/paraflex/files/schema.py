@@ -30,7 +30,7 @@ from pydantic_core import PydanticCustomError
 
 from paraflex.control.laws.described import ControllerDescription, References
 from paraflex.control.laws.kinds import LAWS
-from paraflex.equilibria.given import FACTORS, STEPS
+from paraflex.equilibria.conditions import FACTORS, STEPS
 from paraflex.files.expressions import CONSTANTS, ExpressionError, check_in_time, evaluate
 from paraflex.limits import LARGEST, TEXT_LETTERS, WHOLE
 from paraflex.mechanism import JOINT_KINDS, Mechanism, PointRef, groups_of

@@ -34,7 +34,7 @@ class StudyDefaults:
         Number of output samples.
     assembly : str or None
         Name of the assembly; None for the first one of the mechanism.
-    torques : mapping of str to float or AngleLaw
+    torques : mapping of str to float or TimeProfile
         Motor torques of a run without a path, constant or as profiles [N m].
     orientation : float
         Angle of the end-effector along the path, if it is a task coordinate [rad].

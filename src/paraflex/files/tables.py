@@ -12,13 +12,12 @@ from paraflex.control.shaping.shaped import ShapedPath
 from paraflex.control.shaping.shapers import Shaper
 from paraflex.errors import InputError, within
 from paraflex.files.controllers import controller_table
-from paraflex.files.laws import components_table, law_parameters, law_table
+from paraflex.files.field_values import changed_fields, inexpressible
 from paraflex.files.mechanism import PATHS
-from paraflex.files.said import fields_said, unsayable
+from paraflex.files.profiles import components_table, profile_parameters, profile_table
 from paraflex.files.study import StudyDefaults
 from paraflex.kinematics import Path, SequencePath, TabulatedPath
 from paraflex.mechanism import (
-    AngleLaw,
     AppliedTorque,
     Assembly,
     AssumedModesBeam,
@@ -35,6 +34,7 @@ from paraflex.mechanism import (
     ShapeFunction,
     Sine,
     Start,
+    TimeProfile,
     grouped,
 )
 from paraflex.mechanism.quantities import joint_pair
@@ -76,14 +76,14 @@ def model_tables(
         )  # fmt: skip
     shared = {} if each else _agreed(mechanism)
     names = {kind: _Names(kind, mechanism, file or {}, before) for kind in _NAMED_TABLES}
-    said = {
+    entries = {
         "name": mechanism.name,
         "description": mechanism.description,
         "geometry": "" if mechanism.geometry.value == "second-order" else mechanism.geometry.value,
         **{key: value for key, value in shared.items() if value != _SHARED[key]},
-        "parameters": law_parameters(_laws(model)),
+        "parameters": profile_parameters(_profiles(model)),
         "section": {name: _section(one, name, file or {}) for name, one in names["section"].values.items()},
-        "material": {name: fields_said(material) for name, material in names["material"].values.items()},
+        "material": {name: changed_fields(material) for name, material in names["material"].values.items()},
         "lump": {name: {"mass": mass, "inertia": inertia} for name, (mass, inertia) in names["lump"].values.items()},
         "ground": mechanism.ground,
         "gravity": [] if tuple(mechanism.gravity) == (0.0, 0.0) else mechanism.gravity,
@@ -100,18 +100,18 @@ def model_tables(
             for group, many in grouped(mechanism)
             if group.kinds
         },
-        "end_effector": {} if mechanism.end_effector is None else fields_said(mechanism.end_effector),
+        "end_effector": {} if mechanism.end_effector is None else changed_fields(mechanism.end_effector),
         "assembly": {assembly.name: _assembly(assembly) for assembly in mechanism.assemblies},
         "mode": {mode.name: mode.motors for mode in mechanism.modes},
         "path": {name: _path(path, name, model.paths) for name, path in model.paths.items()},
         "controller": {name: controller_table(one) for name, one in model.controllers.items()},
         "start": {} if model.start is None else _start(model.start),
-        "study": fields_said(study)
+        "study": changed_fields(study)
         | ({"torques": _torques(study)} if study.torques else {})
         | ({} if study.shaper is None else {"shaper": _shaper(study.shaper)}),
-        "statics": fields_said(model.statics),
+        "statics": changed_fields(model.statics),
     }
-    return {key: _plain(value, key) for key, value in said.items() if value or key == "name"}
+    return {key: _plain(value, key) for key, value in entries.items() if value or key == "name"}
 
 
 def _member(member: Any) -> dict[str, Any]:
@@ -121,19 +121,23 @@ def _member(member: Any) -> dict[str, Any]:
     if isinstance(member, PointForce | AppliedTorque):
         with within(f"load.{member.name}"):
             return {"point": member.point} | components_table(member.components, member.kind)
-    return pairs | fields_said(member, "name", *(name for names in together.values() for name in names))
+    return pairs | changed_fields(member, "name", *(name for names in together.values() for name in names))
 
 
-def _laws(model: Any) -> Iterator[tuple[str, AngleLaw]]:
+def _profiles(model: Any) -> Iterator[tuple[str, TimeProfile]]:
     """Yield the time profiles of a model, each with its field in a file."""
     torques = model.study.torques
-    yield from ((f"prescribed.{one.name}.law", one.law) for one in model.mechanism.prescribed)
-    yield from ((f"load.{load.name}.{load.kind}", law) for load in model.mechanism.loads for law in load.laws)
-    yield from ((f"study.torques.{name}", law) for name, law in torques.items() if isinstance(law, AngleLaw))
+    yield from ((f"prescribed.{one.name}.profile", one.profile) for one in model.mechanism.prescribed)
+    yield from (
+        (f"load.{load.name}.{load.kind}", profile) for load in model.mechanism.loads for profile in load.profiles
+    )
+    yield from (
+        (f"study.torques.{name}", profile) for name, profile in torques.items() if isinstance(profile, TimeProfile)
+    )
     for one in model.controllers.values():
-        for sensor, law in one.reference.items() if isinstance(one.reference, Mapping) else ():
-            if isinstance(law, AngleLaw):
-                yield f"controller.{one.name}.reference.{sensor}", law
+        for sensor, profile in one.reference.items() if isinstance(one.reference, Mapping) else ():
+            if isinstance(profile, TimeProfile):
+                yield f"controller.{one.name}.reference.{sensor}", profile
 
 
 def _plain(value: Any, field: str) -> Any:
@@ -153,7 +157,7 @@ def _plain(value: Any, field: str) -> Any:
     try:
         return float(value)
     except (TypeError, ValueError):
-        raise unsayable(field, value, "give a number") from None
+        raise inexpressible(field, value, "give a number") from None
 
 
 def _text(text: str, field: str) -> str:
@@ -211,14 +215,14 @@ def _places(kind: str, mechanism: Mechanism) -> dict[tuple[str, Any], Any]:
         if kind == "lump":
             for lump in given:
                 if (body.name, lump.point) in out:
-                    raise unsayable(f"body.{body.name}.lumps", lump.point, "combine the lumps at a point")
+                    raise inexpressible(f"body.{body.name}.lumps", lump.point, "combine the lumps at a point")
                 out[body.name, lump.point] = (lump.mass, lump.inertia)
         else:
             for k, each in enumerate(given if isinstance(given, tuple) else (given,)):
                 shape = getattr(each, "shape", None)
                 if shape is not None and Section.of(shape) != each:
                     remedy = "give Section.rectangle(...), round(...) or tube(...), or no shape"
-                    raise unsayable(f"body.{body.name}.section", each, remedy)
+                    raise inexpressible(f"body.{body.name}.section", each, remedy)
                 out[body.name, k] = each
     return out
 
@@ -236,13 +240,13 @@ def _section(section: Section, name: str, file: Mapping[str, Any]) -> dict[str, 
     """Build the table of a section; the shape of a rectangle is given only if the file gives it."""
     shape = section.shape
     if shape is None:
-        return fields_said(section)
-    said = shape.kind != "rectangle" or "shape" in file.get("section", {}).get(name, {})
-    return ({"shape": shape.kind} if said else {}) | fields_said(shape)
+        return changed_fields(section)
+    explicit = shape.kind != "rectangle" or "shape" in file.get("section", {}).get(name, {})
+    return ({"shape": shape.kind} if explicit else {}) | changed_fields(shape)
 
 
 def _body(body: Body, names: Mapping[str, _Names], shared: Mapping[str, str]) -> dict[str, Any]:
-    out: dict[str, Any] = {"type": _BODIES[type(body)]} | fields_said(body, "name", *_SHARED)
+    out: dict[str, Any] = {"type": _BODIES[type(body)]} | changed_fields(body, "name", *_SHARED)
     if isinstance(body, FlexibleBeam):
         out |= {key: getattr(body, key) for key in _SHARED if key not in shared}
     if isinstance(body, FlexibleBeam | AssumedModesBeam):
@@ -266,35 +270,37 @@ def _functions(functions: Sequence[ShapeFunction], field: str, direction: str) -
     sines = [function.half_waves for function in functions if isinstance(function, Sine)]
     polynomials = [function.coefficients for function in functions[len(sines) :] if isinstance(function, Polynomial)]
     if sines != list(range(1, len(sines) + 1)) or len(sines) + len(polynomials) != len(functions):
-        raise unsayable(field, functions, "give the sines from 1 on without gaps, then the polynomials")
-    said = {f"{direction}_sines": len(sines), f"{direction}_polynomials": polynomials}
-    return {key: value for key, value in said.items() if value}
+        raise inexpressible(field, functions, "give the sines from 1 on without gaps, then the polynomials")
+    counts = {f"{direction}_sines": len(sines), f"{direction}_polynomials": polynomials}
+    return {key: value for key, value in counts.items() if value}
 
 
 def _prescribed(prescribed: PrescribedAngle, mechanism: Mechanism) -> dict[str, Any]:
     with within(f"prescribed.{prescribed.name}"):
-        law = law_table(prescribed.law, "displacement" if mechanism.slides(prescribed.joint) else "angle")
-    return {"joint": prescribed.joint} | law
+        profile = profile_table(prescribed.profile, "displacement" if mechanism.slides(prescribed.joint) else "angle")
+    return {"joint": prescribed.joint} | profile
 
 
 def _path(path: Path, name: str, paths: Mapping[str, Path]) -> dict[str, Any]:
     if isinstance(path, ShapedPath):
-        said = _path(path.path, name, paths)
-        if "shaper" in said:
-            raise unsayable(f"path.{name}.shaper", "a shaped path shaped again", "give one shaper all frequencies")
-        return said | {"shaper": _shaper(path.shaper)}
+        table = _path(path.path, name, paths)
+        if "shaper" in table:
+            raise inexpressible(f"path.{name}.shaper", "a shaped path shaped again", "give one shaper all frequencies")
+        return table | {"shaper": _shaper(path.shaper)}
     if isinstance(path, SequencePath):
         names = [next((other for other, one in paths.items() if one == part), "") for part in path.paths]
         if not all(names):
-            raise unsayable(f"path.{name}.paths", "a path without a name", "put each of its paths among the model's")
-        return {"type": "sequence", "paths": names} | fields_said(path, "paths")
+            raise inexpressible(
+                f"path.{name}.paths", "a path without a name", "put each of its paths among the model's"
+            )
+        return {"type": "sequence", "paths": names} | changed_fields(path, "paths")
     if isinstance(path, TabulatedPath):
         columns = [*zip(*path.points, strict=True), *([] if path.times is None else [path.times])]
-        return {"type": "table", "table": [*zip(*columns, strict=True)]} | fields_said(path, "points", "times")
-    for kind, made in PATHS.items():
-        if type(path) is made:
-            return {"type": kind} | fields_said(path)
-    raise unsayable(
+        return {"type": "table", "table": [*zip(*columns, strict=True)]} | changed_fields(path, "points", "times")
+    for kind, path_type in PATHS.items():
+        if type(path) is path_type:
+            return {"type": kind} | changed_fields(path)
+    raise inexpressible(
         f"path.{name}",
         type(path).__name__,
         "give a Polygon, Line, Circle, PointPath, TabulatedPath, SequencePath or ShapedPath",
@@ -302,34 +308,34 @@ def _path(path: Path, name: str, paths: Mapping[str, Path]) -> dict[str, Any]:
 
 
 def _shaper(shaper: Shaper) -> dict[str, Any]:
-    return {"type": shaper.kind.value} | fields_said(shaper, "kind")
+    return {"type": shaper.kind.value} | changed_fields(shaper, "kind")
 
 
 def _torques(study: StudyDefaults) -> dict[str, Any]:
     """Build the entries of motor torques: a single number or expression if sufficient, else a table."""
-    said = {}
-    for name, law in study.torques.items():
+    entries = {}
+    for name, profile in study.torques.items():
         with within(f"study.torques.{name}"):
-            table = components_table((law,), "torque")
-        said[name] = table.get("torque", table)
-    return said
+            table = components_table((profile,), "torque")
+        entries[name] = table.get("torque", table)
+    return entries
 
 
 def _assembly(assembly: Assembly) -> dict[str, Any]:
     if "points" in assembly.angles:
-        raise unsayable(f"assembly.{assembly.name}", "points", 'rename the body "points"')
+        raise inexpressible(f"assembly.{assembly.name}", "points", 'rename the body "points"')
     return {**assembly.angles} | ({"points": assembly.points} if assembly.points else {})
 
 
 def _start(start: Start) -> dict[str, Any]:
     velocity = {"angular": start.angular, "point": start.point}
-    said = {
+    entries = {
         "deflection": {
-            body: {point: fields_said(each) for point, each in points.items()}
+            body: {point: changed_fields(each) for point, each in points.items()}
             for body, points in start.deflection.items()
         },
         "velocity": {key: value for key, value in velocity.items() if value},
-        "coordinates": {body: fields_said(each) for body, each in start.coordinates.items()},
-        "rates": {body: fields_said(each) for body, each in start.rates.items()},
+        "coordinates": {body: changed_fields(each) for body, each in start.coordinates.items()},
+        "rates": {body: changed_fields(each) for body, each in start.rates.items()},
     }
-    return {key: value for key, value in said.items() if value}
+    return {key: value for key, value in entries.items() if value}

@@ -67,7 +67,7 @@ class ResultsFolder:
             yield new
 
     @contextmanager
-    def amended(self) -> Iterator[Path]:
+    def added_files(self) -> Iterator[Path]:
         """Yield a temporary folder for files that are added to the results."""
         with self._changed(lambda name: False) as new:
             yield new
@@ -136,10 +136,10 @@ def hold_folder(
     OutputError
         Folder that cannot be created or written.
     """
-    made: list[Path] = []
+    created: list[Path] = []
     try:
         with suppress(OSError):  # name that is too long, reported when the folder is locked
-            made += [each for each in (path, *path.parents) if not each.exists()]
+            created += [each for each in (path, *path.parents) if not each.exists()]
         with lock_folder(path, field=field) as locks:
             there = kind_of_folder(path)
             if there not in ("", kind) and not force:
@@ -158,9 +158,9 @@ def hold_folder(
     finally:
         # Remove the folders that were created here if no results were written.
         with suppress(OSError):
-            if path in made and {file.name for file in path.iterdir()} == {LOCK}:
+            if path in created and {file.name for file in path.iterdir()} == {LOCK}:
                 (path / LOCK).unlink()
-            for each in made:
+            for each in created:
                 each.rmdir()
 
 
@@ -185,6 +185,6 @@ def added_to(folder: Path) -> Iterator[Path]:
                     if kind != STUDY_OF_RUNS:
                         raise
                     break
-                yield stack.enter_context(held.amended()) / folder.relative_to(results)
+                yield stack.enter_context(held.added_files()) / folder.relative_to(results)
                 return
         yield folder

@@ -35,7 +35,7 @@ class ResultKind:
         Files by which the folder is recognised without a manifest, the summary first.
     data : str
         File with the data of figures and reports; empty for a table of many runs.
-    made_by : str
+    producers : str
         Functions that make the dataset, in words; empty for results that are plain numbers.
     along : (str, str) or None
         Dimension along which the results go, and the name of the exported table over it; None without such a table.
@@ -59,7 +59,7 @@ class ResultKind:
     folder: str
     files: tuple[str, ...] = ()
     data: str = ""
-    made_by: str = ""
+    producers: str = ""
     along: tuple[str, str] | None = ("time", "time_series")
     page: str = ""
     with_folder: bool = False

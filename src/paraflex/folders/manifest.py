@@ -167,7 +167,7 @@ def contents_of(files: Mapping[str, Path]) -> dict[str, str]:
 
 def _content(file: Path) -> str:
     if file.suffix == ".json":
-        return _hash(json.dumps(_timeless(json.loads(file.read_text(encoding="utf-8")))).encode()).hexdigest()
+        return _hash(json.dumps(_without_times(json.loads(file.read_text(encoding="utf-8")))).encode()).hexdigest()
     import xarray as xr
 
     found = _hash()
@@ -186,8 +186,8 @@ def _is_listed(file: Path) -> bool:
         finish_change(folder)
         manifest = read_manifest(folder)
         if manifest is not None:
-            wanted = manifest.files.get(file.absolute().relative_to(folder).as_posix())
-            return wanted is None or wanted == digest_of(file)
+            expected = manifest.files.get(file.absolute().relative_to(folder).as_posix())
+            return expected is None or expected == digest_of(file)
     return True
 
 
@@ -196,11 +196,11 @@ def _is_derived(name: str) -> bool:
     return name == _REPORT or name.startswith(("figures/", "export/"))
 
 
-def _timeless(found: Any) -> Any:
+def _without_times(found: Any) -> Any:
     """Return values of JSON without wall times and without digests."""
     if isinstance(found, dict):
-        return {name: _timeless(each) for name, each in sorted(found.items()) if name not in {*_CLOCK, "digest"}}
-    return [_timeless(each) for each in found] if isinstance(found, list) else found
+        return {name: _without_times(each) for name, each in sorted(found.items()) if name not in {*_CLOCK, "digest"}}
+    return [_without_times(each) for each in found] if isinstance(found, list) else found
 
 
 def _hash(data: bytes = b"") -> hashlib.blake2b:

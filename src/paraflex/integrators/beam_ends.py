@@ -19,7 +19,7 @@ from paraflex.mechanism import AtEnd
 
 
 @dataclass(frozen=True)
-class Leaving:
+class Departure:
     """Point that reaches the end of its beam, with the time [s]."""
 
     function: EventFunction
@@ -43,7 +43,7 @@ class BeamEnds:
     """
 
     def __init__(self, system: System, start: State) -> None:
-        self._left: tuple[Leaving, ...] = ()
+        self._left: tuple[Departure, ...] = ()
         within = []
         for function in beam_end_functions(system):
             if function.inside(start.q[None])[0] > 0.0:
@@ -51,16 +51,16 @@ class BeamEnds:
             elif function.ends_run:
                 raise _off_at_start(function, start.time, start.q)
             else:
-                self._left += (Leaving(function, start.time),)
+                self._left += (Departure(function, start.time),)
         self.functions: tuple[EventFunction, ...] = tuple(within)
 
-    def pass_over(
+    def after_crossing(
         self, crossing: Crossing, functions: Sequence[EventFunction]
     ) -> tuple[tuple[EventFunction, ...], Crossing | None]:
         """Return the events that remain after a crossing, and the crossing that ends the run in this step or None."""
         left, found = tuple(functions), crossing
         while found is not None and not found.function.ends_run:
-            self._left += (Leaving(found.function, found.t),)
+            self._left += (Departure(found.function, found.t),)
             left = tuple(function for function in left if function is not found.function)
             found = first_crossing(left, found.before, found.after)
         return left, found
@@ -82,22 +82,22 @@ def leave_beam(system: System, t: Array, q: Array, v: Array) -> tuple[Finding, .
     UnreachablePathError
         A point leaves a beam whose joint has at_end = "error".
     """
-    leavings = list(_leavings(system, t, q, v))
-    for one, k in leavings:
+    departures = list(_departures(system, t, q, v))
+    for one, k in departures:
         end = one.function.event
         assert isinstance(end, BeamEnd)
         if end.at_end is AtEnd.ERROR:
             moment = Moment(one.time, k)
             raise UnreachablePathError(_planned(end, one.function.value(q)), moment, remedy=STAY_ON_BEAM)
-    return _going_on(leavings, q)
+    return _continuing(departures, q)
 
 
 def beyond_ends(system: System, t: Array, q: Array, v: Array) -> tuple[Finding, ...]:
     """Return findings on points that continue beyond the ends of their beams, in a motion at samples t, q, v."""
-    return _going_on(_leavings(system, t, q, v), q)
+    return _continuing(_departures(system, t, q, v), q)
 
 
-def end_of_motion(system: System, t: Array, q: Array, v: Array) -> Leaving | None:
+def end_of_motion(system: System, t: Array, q: Array, v: Array) -> Departure | None:
     """Return the first point to reach the end of its beam in a motion at samples t, q, v, if that ends it, else None.
 
     Raises
@@ -105,24 +105,24 @@ def end_of_motion(system: System, t: Array, q: Array, v: Array) -> Leaving | Non
     InputError
         The point is off its beam at the start.
     """
-    ending = [(one, k) for one, k in _leavings(system, t, q, v) if one.function.ends_run]
+    ending = [(one, k) for one, k in _departures(system, t, q, v) if one.function.ends_run]
     for one, k in ending:
         if k == 0:
             raise _off_at_start(one.function, one.time, q[0])
     return min((one for one, _ in ending), key=lambda one: one.time, default=None)
 
 
-def _going_on(leavings: Iterable[tuple[Leaving, int]], q: Array) -> tuple[Finding, ...]:
-    return tuple(_finding(one, one.function.value(q)) for one, _ in leavings if not one.function.ends_run)
+def _continuing(departures: Iterable[tuple[Departure, int]], q: Array) -> tuple[Finding, ...]:
+    return tuple(_finding(one, one.function.value(q)) for one, _ in departures if not one.function.ends_run)
 
 
-def _leavings(system: System, t: Array, q: Array, v: Array) -> Iterator[tuple[Leaving, int]]:
+def _departures(system: System, t: Array, q: Array, v: Array) -> Iterator[tuple[Departure, int]]:
     """Yield points that leave their beams in a motion, each with the first sample outside."""
     for function in beam_end_functions(system):
         outside = np.nonzero(function.inside(q) <= 0.0)[0]
         if outside.size:
             k = int(outside[0])
-            yield Leaving(function, float(t[0]) if k == 0 else _first_outside(function, t, q, v, k)), k
+            yield Departure(function, float(t[0]) if k == 0 else _first_outside(function, t, q, v, k)), k
 
 
 def _first_outside(function: EventFunction, t: Array, q: Array, v: Array, k: int) -> float:
@@ -155,7 +155,7 @@ def _off_at_start(function: EventFunction, time: float, q: Array) -> InputError:
     )
 
 
-def _finding(one: Leaving, places: Array) -> Finding:
+def _finding(one: Departure, places: Array) -> Finding:
     end = one.function.event
     assert isinstance(end, BeamEnd)
     beyond = np.maximum(-places, places - end.length)

@@ -40,30 +40,30 @@ _GRAVITY = 9.81
 LARGER, _NEARLY = 0.05, 0.01
 
 
-class Between(NamedTuple):
+class RefinedTimes(NamedTuple):
     """Times of samples with additional samples between them.
 
     Attributes
     ----------
     times : (k,) array
         Sample times [s].
-    asked : (k,) array of bool
+    stored : (k,) array of bool
         Whether a sample is kept.
     """
 
     times: Array
-    asked: NDArray[np.bool_]
+    stored: NDArray[np.bool_]
 
     def kept(self, solution: Solution) -> Solution:
         """Return the solution with the requested samples and the state at an event only."""
         keep = np.ones(solution.t.size, dtype=bool)
         count = solution.t.size - bool(solution.event)
-        keep[:count] = self.asked[:count]
+        keep[:count] = self.stored[:count]
         names = ("t", "q", "v", "a", "multipliers", "kinetic_energy", "strain_energy", "work")
         return replace(solution, **{name: getattr(solution, name)[keep] for name in names})
 
 
-def with_between(times: Array, coordinates: int, limits: StepLimits | None = None) -> Between | None:
+def with_between(times: Array, coordinates: int, limits: StepLimits | None = None) -> RefinedTimes | None:
     """Return sample times with additional ones evenly between them.
 
     There are more where inputs change fast, as in a pulse. The result is None if there are no intervals, or if the
@@ -88,13 +88,13 @@ def with_between(times: Array, coordinates: int, limits: StepLimits | None = Non
     steps = times[:-1, None] + np.diff(times)[:, None] * fractions
     found = np.append(steps.ravel(), times[-1])
     if limits is not None and limits.times.size:
-        more = list(_brief(limits, float(np.min(np.diff(found))), times))
+        more = list(_fast_pieces(limits, float(np.min(np.diff(found))), times))
         if (found.size + sum(part.size for part in more)) * coordinates <= _MOST_NUMBERS:
             found = np.unique(np.concatenate([found, *more]))
-    return Between(found, np.isin(found, times))
+    return RefinedTimes(found, np.isin(found, times))
 
 
-def _brief(limits: StepLimits, spacing: float, times: Array) -> Iterator[Array]:
+def _fast_pieces(limits: StepLimits, spacing: float, times: Array) -> Iterator[Array]:
     """Yield times in pieces in which inputs change faster than samples at a spacing resolve."""
     ends = np.append(limits.times[1:], times[-1])
     for first, last, step in zip(limits.times, np.minimum(ends, times[-1]), _PART_OF_STEP * limits.steps, strict=True):

@@ -135,7 +135,7 @@ def samples_until(run: Run, crossing: Crossing) -> Samples:
 
 def _begun_at(problem: Problem, t: float, q: Array, v: Array) -> NativeRun:
     """Return a run started from a state, used only for its first sample and the power there."""
-    moment = {"times": np.array([t]), "stops": np.array([t + problem.span]), "asked": np.ones(1, dtype=bool)}
+    moment = {"times": np.array([t]), "stops": np.array([t + problem.span]), "stored": np.ones(1, dtype=bool)}
     here = replace(problem, initial=State(t, q, v), **moment)
     begun = prepare(here, IntegrationOptions(alpha=0.0, beta=0.0))
     begun.start()

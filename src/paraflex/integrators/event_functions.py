@@ -96,10 +96,10 @@ def event_functions(system: System, q: Array, events: Sequence[Event]) -> tuple[
         if not function.inside(q[None])[0] > 0.0:
             value, unit = float(function.value(q[None])[0]), f" {function.unit}" if function.unit else ""
             bounds = {"above": function.low, "below": function.high}
-            wanted = " and ".join(f"{side} {x:g}{unit}" for side, x in bounds.items() if math.isfinite(x))
+            range_text = " and ".join(f"{side} {x:g}{unit}" for side, x in bounds.items() if math.isfinite(x))
             raise InputError(
                 f"the run would start outside the limits of {function.event}", field="events", value=value,
-                remedy=f"start {wanted}, or move the limit",
+                remedy=f"start {range_text}, or move the limit",
             )  # fmt: skip
     return functions
 

@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from paraflex.arguments import CheckedFields, given_as
+from paraflex.arguments import CheckedFields, named_in_errors
 from paraflex.errors import InputError
 from paraflex.mechanism import AtEnd, FlexibleBeam, Mechanism, RigidBody
 from paraflex.mechanism.quantities import known
@@ -125,7 +125,7 @@ class BeamEnd:
 
 
 Event = JointLimit | DeflectionLimit | SingularDistance
-given_as("an event")(Event)
+named_in_errors("an event")(Event)
 
 
 def beam_ends(mechanism: Mechanism) -> tuple[BeamEnd, ...]:

@@ -13,8 +13,8 @@ import numpy as np
 from paraflex.arguments import checked_arguments
 from paraflex.arrays import Array
 from paraflex.dynamics import State, System, dependence
+from paraflex.dynamics.change_points import dependent_drives
 from paraflex.dynamics.rank import DENSE_ROWS
-from paraflex.dynamics.special import barred_drives
 from paraflex.errors import (
     ConstraintDriftError,
     IntegrationError,
@@ -27,15 +27,15 @@ from paraflex.integrators.between import samples_too_few, with_between
 from paraflex.integrators.crossing import Crossing, advance, samples_until
 from paraflex.integrators.event_functions import event_functions
 from paraflex.integrators.events import BeamEnd
+from paraflex.integrators.external_run import prepare as prepare_outside
 from paraflex.integrators.limits import elements_too_few
 from paraflex.integrators.method import Family, NativeMethod
 from paraflex.integrators.native import own, prepare as prepare_native
 from paraflex.integrators.options import IntegrationOptions, loose_tolerance, refuse_tolerance
-from paraflex.integrators.outside import prepare as prepare_outside
 from paraflex.integrators.pace import Pace, too_slow
 from paraflex.integrators.run import Instant, Problem, Run, make_problem
 from paraflex.integrators.solution import Solution
-from paraflex.integrators.watch import Breakdown, bent_too_far, come_apart, least_norm
+from paraflex.integrators.watch import Breakdown, excessive_bending, least_norm, open_constraint
 from paraflex.kernel.packed import Signals
 from paraflex.kernel.run_state import ERROR_TEST, FINISHED, LAW_FAILED, NO_CONVERGENCE, NOT_FINITE, PAUSED
 from paraflex.kernel.sampled import SampledLaw, no_law
@@ -54,7 +54,7 @@ _AROUND = "start or drive the mechanism so that it does not get there"
 _WITHIN_REACH = "prescribe motions that end, or turn back, before it"
 _SHORTER = "take a shorter step, or leave it out and choose a tolerance"
 _NOT_IN_PARTS = Breakdown("Newton's iteration does not converge in a fixed step, nor in parts of it,", _SHORTER)
-_UNITS_REMEDY = "look for masses, stiffnesses, loads and laws in a wrong unit"
+_UNITS_REMEDY = "look for masses, stiffnesses, loads and profiles in a wrong unit"
 # Causes and remedies by the code with which the kernel ends a run.
 CAUSES = {
     NO_CONVERGENCE: Breakdown(
@@ -67,7 +67,7 @@ CAUSES = {
     ),
     ERROR_TEST: Breakdown(
         "the error test asks for steps below the smallest one",
-        f"{_UNITS_REMEDY}, for loads and laws that jump, or choose a coarser tolerance",
+        f"{_UNITS_REMEDY}, for loads and profiles that jump, or choose a coarser tolerance",
     ),
 }
 
@@ -143,7 +143,7 @@ def integrate(
     return integration.solution()
 
 
-class Kept(NamedTuple):
+class IntegrationState(NamedTuple):
     """State of an integration: the arrays of its run, and further attributes."""
 
     arrays: tuple[np.ndarray, ...]
@@ -186,7 +186,7 @@ class Integration:
         problem = make_problem(system, signals, initial, times, knots)
         self._between = with_between(problem.times, system.n, problem.limits) if samples and own else None
         if self._between is not None:
-            problem = replace(problem, times=self._between.times, asked=self._between.asked)
+            problem = replace(problem, times=self._between.times, stored=self._between.stored)
         self._ends = BeamEnds(system, initial)
         self._crossing: Crossing | None = None
         self._functions = (*event_functions(system, initial.q, options.events), *self._ends.functions)
@@ -234,7 +234,7 @@ class Integration:
                 self._code = FINISHED
                 return
             if crossing is not None:
-                self._functions, crossing = self._ends.pass_over(crossing, self._functions)
+                self._functions, crossing = self._ends.after_crossing(crossing, self._functions)
             if crossing is not None:
                 self.status, self.message, self._crossing = "stopped", crossing.message, crossing
                 return
@@ -248,13 +248,13 @@ class Integration:
         """Mark the run as interrupted by the user; the solution so far is kept."""
         self.status, self.message = "interrupted", f"interrupted at t = {self.time:.6g} s"
 
-    def saved(self) -> Kept:
+    def saved(self) -> IntegrationState:
         """Return the complete state of the integration, exact to the last bit; for own methods only."""
         more = {name: getattr(self, name) for name in _KEPT}
         arrays = tuple(one.copy() for one in own(self.run).arrays())
-        return Kept(arrays, more | {"_ends": copy.copy(self._ends), "_pace": self._pace.copy()})
+        return IntegrationState(arrays, more | {"_ends": copy.copy(self._ends), "_pace": self._pace.copy()})
 
-    def restore(self, kept: Kept) -> None:
+    def restore(self, kept: IntegrationState) -> None:
         """Restore a state from `saved`, of this integration or of one made with the same arguments."""
         # Copy into the existing arrays: their position in memory must not change, as rounding may depend on it.
         for mine, array in zip(own(self.run).arrays(), kept.arrays, strict=True):
@@ -264,7 +264,7 @@ class Integration:
         self._ends, self._pace = copy.copy(self._ends), self._pace.copy()
 
     @property
-    def goes_on(self) -> bool:
+    def can_continue(self) -> bool:
         """Whether the run has reached the time that it was advanced to, and can go on."""
         return self.status == "complete" and self._code == FINISHED and self._broken is None
 
@@ -288,7 +288,7 @@ class Integration:
         if self._crossing is not None and isinstance(end, BeamEnd) and end.at_end is AtEnd.ERROR:
             moment = Moment(self._crossing.t, solution.steps)
             raise _failed(SliderOffBeamError(self._crossing.reached, moment, solution, STAY_ON_BEAM))
-        if self.goes_on or self.status in ("interrupted", "stopped"):
+        if self.can_continue or self.status in ("interrupted", "stopped"):
             return solution
         raise _failed(self._error(solution))
 
@@ -301,8 +301,8 @@ class Integration:
         self._looked = run.attempts
         largest = run.figures().constraint_position_max
         limits = (run.dependent_rows, self._tolerance, options.treatment, largest)
-        bent = bent_too_far(self._system, now.q)
-        drift = come_apart(self._system, problem.signals, now.t, now.q, *limits)
+        bent = excessive_bending(self._system, now.q)
+        drift = open_constraint(self._system, problem.signals, now.t, now.q, *limits)
         self._broken, self._drifts = bent or drift, drift is not None and bent is None
         if self._broken is None and self._code == PAUSED and self._pace.look(run.attempts, now.t):
             self._broken = too_slow(self._system, now, problem.initial.q, self._pace, problem.jumps)
@@ -317,7 +317,9 @@ class Integration:
         # Near a singular position either Newton's iteration or the error test may fail first.
         stopped = code != PAUSED and self._broken is None
         lost, near = (dependence(system, now.q, part) for part in (_NEARLY_DEPENDENT, _NEAR))
-        drives = "" if self._drifts or near.dropped.size <= run.dependent_rows else barred_drives(system, now.q, near)
+        drives = (
+            "" if self._drifts or near.dropped.size <= run.dependent_rows else dependent_drives(system, now.q, near)
+        )
         error = ConstraintDriftError if self._drifts else IntegrationError
         if drives:
             error, cause = SingularPositionError, f"the constraints lose rank at the limit of reach, {drives},"
@@ -360,8 +362,8 @@ def _singular_start(run: Run, times: Array, q: Array) -> Array:
     """Return the start as a passage (2, 1) if more rows are dependent there than at the next sample, else (2, 0)."""
     initial, system = run.problem.initial.time, run.problem.system
     if run.dependent_at_start and times.size > 1 and times[0] == initial and system.m <= DENSE_ROWS:
-        lasting = dependence(system, q[1]).dropped.size
-        return np.full((2, int(lasting < run.dependent_at_start)), initial)
+        permanent = dependence(system, q[1]).dropped.size
+        return np.full((2, int(permanent < run.dependent_at_start)), initial)
     return np.zeros((2, 0))
 
 

@@ -65,7 +65,7 @@ def elements_too_few(system: System, limits: StepLimits) -> list[Finding]:
             if resolved < fastest:
                 found[name] = Finding(
                     "elements-few", f"body.{name}.elements",
-                    f"loads or laws change as fast as a vibration of {fastest:.2g} rad/s, but elements of {name} "
+                    f"loads or profiles change as fast as a vibration of {fastest:.2g} rad/s, but elements of {name} "
                     f"resolve vibrations only up to {resolved:.2g} rad/s: deflections, forces and stresses may be "
                     "far off",
                     "give it more elements",

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field, fields
 from enum import Enum
 from typing import Any, ClassVar
 
-from paraflex.arguments import CheckedFields, given_as
+from paraflex.arguments import CheckedFields, named_in_errors
 from paraflex.errors import InputError
 from paraflex.kernel.run_state import Tableau
 
@@ -133,7 +133,9 @@ class Method(CheckedFields, ABC):
         return int(self.values.get("max_order", self.order))
 
 
-given_as("a method of integration", 'its name, such as "tr-bdf2", or an object of paraflex.methods')(Method | str)
+named_in_errors("a method of integration", 'its name, such as "tr-bdf2", or an object of paraflex.methods')(
+    Method | str
+)
 
 
 class NativeMethod(Method):

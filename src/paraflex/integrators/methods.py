@@ -10,7 +10,14 @@ from collections.abc import Mapping
 from types import MappingProxyType
 
 from paraflex.errors import InputError, suggestion, within
-from paraflex.integrators.guests import BDF as BDF, IDA as IDA, NDF as NDF, RK45 as RK45, Adams as Adams, Radau as Radau
+from paraflex.integrators.external_methods import (
+    BDF as BDF,
+    IDA as IDA,
+    NDF as NDF,
+    RK45 as RK45,
+    Adams as Adams,
+    Radau as Radau,
+)
 from paraflex.integrators.method import Family as Family, Method as Method, Treatment as Treatment
 from paraflex.integrators.newmark import (
     HHT as HHT,

@@ -16,7 +16,7 @@ from paraflex.integrators.method import NativeMethod, Treatment
 from paraflex.integrators.newmark import NewmarkMethod
 from paraflex.integrators.options import Control, IntegrationOptions, TolerancePer
 from paraflex.integrators.run import DEPENDENT_PART, FIRST_STEP, Figures, Instant, Problem, Run, empty_samples
-from paraflex.integrators.singular_start import Beside, begin_on_branch, beside_singular
+from paraflex.integrators.singular_start import BranchPose, begin_on_branch, pose_on_branch
 from paraflex.kernel.linear import factor_system
 from paraflex.kernel.march import march, start
 from paraflex.kernel.packed import Workspace
@@ -103,7 +103,7 @@ class NativeRun:
     aside: Workspace
     law: SampledLaw
     dependent_at_start: int
-    beside: Beside | None
+    branch: BranchPose | None
 
     @property
     def dependent_rows(self) -> int:
@@ -133,8 +133,8 @@ class NativeRun:
         """Compute the initial accelerations and multipliers and take the first sample, see `Run`."""
         arguments = (self.problem.system.packed, self.problem.signals, self.controls)
         start(*arguments, self.state, self.workspace, self.samples)
-        if self.beside is not None:
-            begin_on_branch(self.problem, self.beside, self.state, self.slow)
+        if self.branch is not None:
+            begin_on_branch(self.problem, self.branch, self.state, self.slow)
             self.samples.a[: self.reached] = self.state.stage_a[1, 0]
 
     def march(self, attempts: int) -> int:
@@ -261,12 +261,12 @@ def prepare(problem: Problem, options: IntegrationOptions) -> NativeRun:
     state = make_march(system.n, system.m, scheme.c.size, inputs_of(system.mechanism).acting, treatment)
     state.q[:], state.v[:] = initial.q, initial.v
     workspace = system.workspace()
-    at_start = lasting = _mark_redundant(system, initial.q, workspace)
-    beside = beside_singular(problem) if at_start else None
-    if beside is not None:
-        lasting = _mark_redundant(system, beside.q, workspace)
+    at_start = permanent = _mark_redundant(system, initial.q, workspace)
+    branch = pose_on_branch(problem) if at_start else None
+    if branch is not None:
+        permanent = _mark_redundant(system, branch.q, workspace)
     # In steps shorter than the second value, rows near dependence are negligible.
-    first = FIRST_STEP * span if beside is None else 0.1 * beside.later
+    first = FIRST_STEP * span if branch is None else 0.1 * branch.later
     state.clock[TIME], state.clock[STEP] = initial.time, min(first, options.max_step)
     state.clock[CYCLE] = span
     tolerance, phase = options.tolerance_for(system), _PHASES[min(method.order, 4)]
@@ -293,7 +293,7 @@ def prepare(problem: Problem, options: IntegrationOptions) -> NativeRun:
         limit_h=phase * problem.limits.steps,
         turn_in_step=phase,
         dependent_part=ROUNDING_PART,
-        dependent_rows=lasting,
+        dependent_rows=permanent,
     )
     return NativeRun(
         problem=problem,
@@ -302,9 +302,9 @@ def prepare(problem: Problem, options: IntegrationOptions) -> NativeRun:
         state=state,
         workspace=workspace,
         slow=system.workspace(),
-        samples=empty_samples(problem.times, system, problem.asked),
+        samples=empty_samples(problem.times, system, problem.stored),
         aside=system.workspace(),
         law=no_law(),
         dependent_at_start=at_start,
-        beside=beside,
+        branch=branch,
     )

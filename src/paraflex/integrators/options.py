@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from paraflex.arguments import CheckedFields, checked_arguments, given_as
+from paraflex.arguments import CheckedFields, checked_arguments, named_in_errors
 from paraflex.dynamics import System
 from paraflex.errors import InputError, as_enum
 from paraflex.findings import Finding
@@ -51,7 +51,7 @@ class TolerancePer(Enum):
     RUN = "run"
 
 
-@given_as("IntegrationOptions", "them, say IntegrationOptions(tolerance=1e-6)")
+@named_in_errors("IntegrationOptions", "them, say IntegrationOptions(tolerance=1e-6)")
 @dataclass(frozen=True)
 class IntegrationOptions(CheckedFields):
     """Method, tolerance and further options of an integration.

@@ -50,7 +50,7 @@ class Problem:
         Stops at which an input jumps [s]: no step may use the values after the jump.
     limits : StepLimits
         Longest steps that resolve the inputs.
-    asked : (k,) array of bool
+    stored : (k,) array of bool
         Whether a sample is kept; others serve to find the largest loads.
     """
 
@@ -61,7 +61,7 @@ class Problem:
     stops: Array
     jumps: Array
     limits: StepLimits
-    asked: NDArray[np.bool_]
+    stored: NDArray[np.bool_]
 
     @property
     def span(self) -> float:
@@ -186,18 +186,18 @@ def make_problem(
     inner = np.unique(inner[(inner > initial.time) & (inner < times[-1])])
     inputs = inputs_of(system.mechanism)
     jumps = jump_times(signals, inputs, inner)
-    asked, limits = np.ones(times.size, dtype=bool), step_limits(signals, inputs)
-    return Problem(system, signals, initial, times, np.append(inner, times[-1]), jumps, limits, asked)
+    stored, limits = np.ones(times.size, dtype=bool), step_limits(signals, inputs)
+    return Problem(system, signals, initial, times, np.append(inner, times[-1]), jumps, limits, stored)
 
 
-def empty_samples(times: Array, system: System, asked: NDArray[np.bool_] | None = None) -> Samples:
+def empty_samples(times: Array, system: System, stored: NDArray[np.bool_] | None = None) -> Samples:
     """Return samples to be filled."""
     widths = {"q": system.n, "v": system.n, "a": system.n, "lam": system.m, "energy": 3}
     arrays = {name: apart((times.size, width)) for name, width in widths.items()}
     for array in arrays.values():
         array.fill(np.nan)
-    asked = np.ones(times.size, dtype=bool) if asked is None else np.ascontiguousarray(asked)
-    return Samples(times=times, asked=asked, solved=np.zeros(times.size, dtype=bool), **arrays)
+    stored = np.ones(times.size, dtype=bool) if stored is None else np.ascontiguousarray(stored)
+    return Samples(times=times, stored=stored, solved=np.zeros(times.size, dtype=bool), **arrays)
 
 
 def jump_times(signals: Signals, inputs: Inputs, knots: Array) -> Array:

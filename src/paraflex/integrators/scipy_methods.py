@@ -9,8 +9,8 @@ import numpy as np
 import scipy
 
 from paraflex.arrays import Array
+from paraflex.integrators.external_methods import SciPyMethod
 from paraflex.integrators.forms import OdeForm
-from paraflex.integrators.guests import SciPyMethod
 from paraflex.integrators.stepper import SolverCounts, Steps, attempts
 from paraflex.kernel.run_state import ERROR_TEST, NOT_FINITE, PAUSED
 

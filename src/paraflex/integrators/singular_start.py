@@ -29,14 +29,14 @@ from paraflex.kernel.run_state import PREPARED, ROOT, ROOT_RATE, ROOT_STEP, WIDE
 _BESIDE = 1e-2
 
 
-class Beside(NamedTuple):
+class BranchPose(NamedTuple):
     """Pose beside a singular start: coordinates (n,), and the time from the start to it [s]."""
 
     q: Array
     later: float
 
 
-def beside_singular(problem: Problem) -> Beside | None:
+def pose_on_branch(problem: Problem) -> BranchPose | None:
     """Find a pose on the branch with fewer dependent rows than the start; None if the start is not singular."""
     system, start = problem.system, problem.initial
     pace = float(np.max(np.abs(start.v / system.units), initial=0.0))
@@ -46,17 +46,17 @@ def beside_singular(problem: Problem) -> Beside | None:
     t, change_at = start.time + later, partial(constraint_change, system)
     q, phi = assemble(system, moment_signals(system.mechanism, t), t, start.q + later * start.v, change_at)
     if closed(system, q, phi) and dependence(system, q).dropped.size < dropped:
-        return Beside(q, later)
+        return BranchPose(q, later)
     return None
 
 
-def begin_on_branch(problem: Problem, beside: Beside, march: March, aside: Workspace) -> None:
+def begin_on_branch(problem: Problem, branch: BranchPose, march: March, aside: Workspace) -> None:
     """Set the accelerations of the branch after the first stage of a run, and mark the singular position as near."""
     a = march.stage_a[1, 0]
-    a += _missing(problem, beside.later, a)
+    a += _missing(problem, branch.later, a)
     march.algorithmic[0] = a
-    factor_system(problem.system.packed, 0.0, beside.q, aside)
-    march.clock[ROOT], march.clock[ROOT_RATE] = 0.0, sqrt(max(aside.least[0], 0.0)) / beside.later
+    factor_system(problem.system.packed, 0.0, branch.q, aside)
+    march.clock[ROOT], march.clock[ROOT_RATE] = 0.0, sqrt(max(aside.least[0], 0.0)) / branch.later
     march.clock[WIDEST] = 1.0
     march.counts[ROOT_STEP], march.counts[PREPARED] = 0, 1
 

@@ -84,20 +84,22 @@ def spectrum(method: Method | str, frequency: ArrayLike, *, order: int | None = 
     InputError
         There is no such method or order, or the frequencies do not ascend from above zero.
     """
-    wanted = np.asarray(frequency, dtype=float).reshape(-1)
-    if not (wanted.size and np.all(np.isfinite(wanted)) and wanted[0] > 0.0 and np.all(np.diff(wanted) > 0.0)):
+    requested = np.asarray(frequency, dtype=float).reshape(-1)
+    if not (
+        requested.size and np.all(np.isfinite(requested)) and requested[0] > 0.0 and np.all(np.diff(requested) > 0.0)
+    ):
         raise InputError(
             "frequencies must be positive and ascend", field="frequency", remedy="say numpy.geomspace(0.01, 100, 200)"
         )
     roots = _roots(find_method(method), order)
-    first = min(_FIRST_FREQUENCY, wanted[0])
-    steps = int(np.log(wanted[-1] / first) / np.log(_DENSE)) + 2
-    grid = np.union1d(np.geomspace(first, wanted[-1], steps), wanted)
+    first = min(_FIRST_FREQUENCY, requested[0])
+    steps = int(np.log(requested[-1] / first) / np.log(_DENSE)) + 2
+    grid = np.union1d(np.geomspace(first, requested[-1], steps), requested)
     every = [roots(x) for x in grid]
     principal = _followed(every, np.exp(1j * first))
-    here = np.searchsorted(grid, wanted)
+    here = np.searchsorted(grid, requested)
     return Spectrum(
-        frequency=wanted,
+        frequency=requested,
         principal=principal[here],
         phase=np.unwrap(np.angle(principal))[here],
         radius=np.array([np.max(np.abs(every[k])) for k in here]),

@@ -13,8 +13,8 @@ import numpy as np
 
 from paraflex.arrays import Array
 from paraflex.errors import InputError
+from paraflex.integrators.external_methods import ExternalMethod
 from paraflex.integrators.forms import DescriptorForm, OdeForm
-from paraflex.integrators.guests import Guest
 from paraflex.integrators.stepper import SolverCounts, Steps, attempts
 from paraflex.kernel.run_state import ERROR_TEST, NO_CONVERGENCE, NOT_FINITE, PAUSED
 
@@ -115,7 +115,7 @@ class SundialsStepper:
 class CvodeStepper(SundialsStepper):
     """CVODE for the ODE form."""
 
-    def __init__(self, method: Guest, form: OdeForm, *arguments: Any) -> None:
+    def __init__(self, method: ExternalMethod, form: OdeForm, *arguments: Any) -> None:
         super().__init__(*arguments)
         self.form = form
         self._method = method.solver

@@ -29,7 +29,7 @@ class Breakdown(NamedTuple):
     remedy: str
 
 
-def bent_too_far(system: System, q: Array) -> Breakdown | None:
+def excessive_bending(system: System, q: Array) -> Breakdown | None:
     """Return a breakdown with the beam whose slope exceeds the validity of the theory, and its slope, or None."""
     if not np.max(np.abs(system.slope_rows @ q), initial=0.0) > _LARGEST_SLOPE:
         return None
@@ -44,7 +44,7 @@ def bent_too_far(system: System, q: Array) -> Breakdown | None:
     return None
 
 
-def come_apart(
+def open_constraint(
     system: System,
     signals: Signals,
     t: float,

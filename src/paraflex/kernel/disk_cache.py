@@ -18,7 +18,7 @@ from typing import Any
 
 from numba.core.caching import FunctionCache, IndexDataCacheFile
 
-from paraflex.kernel.notice import announce_damage, announce_no_room
+from paraflex.kernel.notice import announce_damage, announce_disk_full
 from paraflex.kernel.plain import STATE
 
 # Number of states kept: a checkout may be used by several environments, a cache in a home folder by several machines.
@@ -86,7 +86,7 @@ class KernelCache(FunctionCache):
             make_folder(self._place)
             super()._save_overload(sig, data)
         except OSError as error:
-            announce_no_room(self._place, error)
+            announce_disk_full(self._place, error)
 
 
 def make_folder(place: Path) -> Path:

@@ -35,7 +35,7 @@ def announce_damage(file: Path) -> None:
         LOG.warning("paraflex: a compiled kernel is damaged and compiled anew (%s)", file)
 
 
-def announce_no_room(place: Path, error: OSError) -> None:
+def announce_disk_full(place: Path, error: OSError) -> None:
     """Report that compiled kernels could not be saved."""
     reason = (error.strerror or str(error)).lower()
     line = f"paraflex: compiled kernels cannot be kept in {place} ({reason}): the next process compiles anew"

@@ -58,8 +58,8 @@ def compiled(function: Callable[..., Any], *, nogil: bool = False, **options: An
     """Return a function compiled by plain Numba; options of paraflex's own compiler are ignored."""
     # The cache identifies the function by this name, and does not check the sources of other functions.
     function.__qualname__ = f"{function.__qualname__}_{STATE}"
-    wanted = {name: options[name] for name in ("error_model", "fastmath")}
-    return numba.njit(cache=True, nogil=nogil, **wanted)(function)
+    chosen = {name: options[name] for name in ("error_model", "fastmath")}
+    return numba.njit(cache=True, nogil=nogil, **chosen)(function)
 
 
 def by_reference(record: type) -> type:

@@ -146,7 +146,7 @@ class Samples(NamedTuple):
     """Dense output: requested times and the solution there."""
 
     times: NDArray[np.float64]
-    asked: NDArray[np.bool_]  # (times,) whether a sample is kept; others serve to find the largest loads
+    stored: NDArray[np.bool_]  # (times,) whether a sample is kept; others serve to find the largest loads
     solved: NDArray[np.bool_]  # (times,) whether the equations of motion were solved, instead of interpolation
     q: NDArray[np.float64]  # (times, n)
     v: NDArray[np.float64]

@@ -111,7 +111,7 @@ def solve_samples(system, signals, controls, t, h, first, march, work, out, asid
     if controls.treatment == BAUMGARTE:
         weights = constraint_weights(controls, march.clock[TRIED])[0]
     for i in range(first, march.counts[SAMPLE]):
-        needed = near or out.asked[i] or (h >= controls.long_from and march.clock[SAMPLE_CHANGE] > FORCES_BETWEEN)
+        needed = near or out.stored[i] or (h >= controls.long_from and march.clock[SAMPLE_CHANGE] > FORCES_BETWEEN)
         if needed and out.times[i] < t + h * (1.0 - SAME_TIME):
             explicit_parts(out.q[i], out.v[i], out.a[i], g, b, march)
             copy(out.a[i], march.eq)

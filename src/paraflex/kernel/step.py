@@ -275,10 +275,10 @@ def attempt(system, signals, tableau, controls, t, h, march, work, slow):
                 begin_near(system, march, work)
                 rounds = 0
                 continue
-            goes_on = rubs or (status == SLOW and controls.fixed_step > 0.0)
-            if fresh and (rounds == ROUNDS or not goes_on):
+            can_continue = rubs or (status == SLOW and controls.fixed_step > 0.0)
+            if fresh and (rounds == ROUNDS or not can_continue):
                 return NO_CONVERGENCE, 0.0
-            rounds = rounds + 1 if goes_on else 0
+            rounds = rounds + 1 if can_continue else 0
             # The cause may be an old factor: try again with a new one before the step is reduced.
             if not fresh:
                 renew_factor(system, b, march, work)

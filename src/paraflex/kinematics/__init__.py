@@ -8,7 +8,6 @@ from paraflex.kinematics.closure import (
     pose_at as pose_at,
     reach_shortfall as reach_shortfall,
 )
-from paraflex.kinematics.laws import CruiseLaw as CruiseLaw, TrapezoidalLaw as TrapezoidalLaw
 from paraflex.kinematics.model import ModelWithPaths as ModelWithPaths
 from paraflex.kinematics.paths import (
     Circle as Circle,
@@ -22,4 +21,5 @@ from paraflex.kinematics.paths import (
     length_fraction as length_fraction,
     turning_of as turning_of,
 )
+from paraflex.kinematics.profiles import CruiseProfile as CruiseProfile, TrapezoidalProfile as TrapezoidalProfile
 from paraflex.kinematics.reach import Shortfall as Shortfall

@@ -13,10 +13,10 @@ import numpy as np
 import scipy
 from numpy.typing import NDArray
 
-from paraflex.arguments import CheckedFields, checked_arguments, given_as
+from paraflex.arguments import CheckedFields, checked_arguments, named_in_errors
 from paraflex.arrays import Array
 from paraflex.errors import InputError
-from paraflex.kinematics.laws import CruiseLaw, TrapezoidalLaw
+from paraflex.kinematics.profiles import CruiseProfile, TrapezoidalProfile
 from paraflex.limits import PATH_POINTS, at_most
 from paraflex.mechanism.quantities import finite, not_negative, positive
 
@@ -39,7 +39,7 @@ class PathMotion(NamedTuple):
     acceleration: Array
 
 
-@given_as(
+@named_in_errors(
     "a path",
     "a path: Polygon, Line, Circle, PointPath, TabulatedPath, SequencePath or ShapedPath, or one that "
     "paraflex.load_path reads",
@@ -63,14 +63,14 @@ class Path(Protocol):
         ...
 
 
-given_as("a path", "a path such as Polygon, Line, Circle or PointPath; or with a model the name of one of its paths")(
-    Path | str
-)
+named_in_errors(
+    "a path", "a path such as Polygon, Line, Circle or PointPath; or with a model the name of one of its paths"
+)(Path | str)
 
 
 @dataclass(frozen=True)
 class Polygon(CheckedFields):
-    """Straight segments from corner to corner, each from rest to rest under the modified trapezoidal law.
+    """Straight segments from corner to corner, each from rest to rest under the modified trapezoidal profile.
 
     Attributes
     ----------
@@ -108,12 +108,12 @@ class Polygon(CheckedFields):
         return np.sqrt(np.sum(np.diff(self._vertices, axis=0) ** 2, axis=1))
 
     @cached_property
-    def _laws(self) -> list[TrapezoidalLaw]:
-        return [TrapezoidalLaw(length.item(), self.max_acceleration) for length in self._lengths]
+    def _profiles(self) -> list[TrapezoidalProfile]:
+        return [TrapezoidalProfile(length.item(), self.max_acceleration) for length in self._lengths]
 
     @cached_property
     def _starts(self) -> Array:
-        return np.cumsum([0.0] + [law.duration for law in self._laws])
+        return np.cumsum([0.0] + [profile.duration for profile in self._profiles])
 
     @property
     def duration(self) -> float:
@@ -124,7 +124,11 @@ class Polygon(CheckedFields):
     @property
     def knots(self) -> tuple[float, ...]:
         """Ends of the phases of every segment [s]."""
-        times = [start + knot for start, law in zip(self._starts, self._laws, strict=False) for knot in law.knots[:-1]]
+        times = [
+            start + knot
+            for start, profile in zip(self._starts, self._profiles, strict=False)
+            for knot in profile.knots[:-1]
+        ]
         return (*times, self.duration)
 
     def evaluate(self, t: Array) -> PathMotion:
@@ -134,8 +138,8 @@ class Polygon(CheckedFields):
         position = np.tile(self._vertices[0].astype(kind), (t.size, 1))
         velocity, acceleration = np.zeros((t.size, 2), kind), np.zeros((t.size, 2), kind)
         directions = np.diff(self._vertices, axis=0) / self._lengths[:, None]
-        for start, law, direction in zip(self._starts, self._laws, directions, strict=False):
-            s, speed, rate = law.evaluate(t - start)
+        for start, profile, direction in zip(self._starts, self._profiles, directions, strict=False):
+            s, speed, rate = profile.evaluate(t - start)
             position += s[:, None] * direction
             velocity += speed[:, None] * direction
             acceleration += rate[:, None] * direction
@@ -180,7 +184,7 @@ class FixedPoint:
 
 @dataclass(frozen=True)
 class Circle(CheckedFields):
-    """An arc under the modified trapezoidal law along its length.
+    """An arc under the modified trapezoidal profile along its length.
 
     Attributes
     ----------
@@ -214,22 +218,22 @@ class Circle(CheckedFields):
         positive(self.max_acceleration, "max_acceleration", "m/s^2")
 
     @cached_property
-    def _law(self) -> TrapezoidalLaw:
-        return TrapezoidalLaw(self.radius * self.sweep * np.sign(np.real(self.sweep)), self.max_acceleration)
+    def _profile(self) -> TrapezoidalProfile:
+        return TrapezoidalProfile(self.radius * self.sweep * np.sign(np.real(self.sweep)), self.max_acceleration)
 
     @property
     def duration(self) -> float:
         """Duration of the motion [s]."""
-        return self._law.duration
+        return self._profile.duration
 
     @property
     def knots(self) -> tuple[float, ...]:
-        """Ends of the phases of the law [s]."""
-        return self._law.knots
+        """Ends of the phases of the profile [s]."""
+        return self._profile.knots
 
     def evaluate(self, t: Array) -> PathMotion:
         """Return the motion at times t [s]."""
-        s, speed, rate = self._law.evaluate(np.atleast_1d(t) * 1.0)
+        s, speed, rate = self._profile.evaluate(np.atleast_1d(t) * 1.0)
         sense = np.sign(np.real(self.sweep)) / self.radius
         angle, turn, dturn = self.start_angle + sense * s, sense * speed, sense * rate
         radial = np.column_stack([np.cos(angle), np.sin(angle)])
@@ -296,7 +300,7 @@ class TabulatedPath(CheckedFields):
 
     With times, the path is a quintic spline in time that passes the points at these times, at rest at both ends.
     Without times, it is the natural quintic spline over the lengths of the chords, followed under a motion profile
-    along its length: the modified trapezoidal one for a given time or acceleration, a `CruiseLaw` with a largest speed.
+    along its length: the modified trapezoidal one for a given time or acceleration, or a `CruiseProfile`.
     Accelerations are along the path, without the centripetal one.
 
     Attributes
@@ -332,15 +336,15 @@ class TabulatedPath(CheckedFields):
                 f"points {same[0] + 1} and {same[0] + 2} coincide", field="points", value=self.points[same[0]],
                 remedy="drop one of them",
             )  # fmt: skip
-        self._check_law()
+        self._check_profile()
         if self.times is not None:
             self._check_times(np.array(self.times, dtype=float))
 
-    def _check_law(self) -> None:
+    def _check_profile(self) -> None:
         given = [name for name in ("times", "motion_time", "max_acceleration") if getattr(self, name) is not None]
         if len(given) != 1:
             raise InputError(
-                "its law of motion is given in two ways" if given else "its law of motion is not given",
+                "its motion profile is given in two ways" if given else "its motion profile is not given",
                 field=given[-1] if given else "max_acceleration", value=", ".join(given) or None,
                 remedy=f"drop all but {given[0]}" if given else "give max_acceleration, motion_time, or times",
             )  # fmt: skip
@@ -378,49 +382,49 @@ class TabulatedPath(CheckedFields):
         return _Curve(np.array(self.points))
 
     @cached_property
-    def _law(self) -> TrapezoidalLaw | CruiseLaw:
+    def _profile(self) -> TrapezoidalProfile | CruiseProfile:
         length = self._curve.length
         if self.motion_time is not None:
-            return TrapezoidalLaw(length, pi * length / (self.motion_time / 1.5) ** 2)
+            return TrapezoidalProfile(length, pi * length / (self.motion_time / 1.5) ** 2)
         assert self.max_acceleration is not None
         if self.max_speed is None:
-            return TrapezoidalLaw(length, self.max_acceleration)
-        return CruiseLaw(length, self.max_acceleration, self.max_speed)
+            return TrapezoidalProfile(length, self.max_acceleration)
+        return CruiseProfile(length, self.max_acceleration, self.max_speed)
 
     @property
     def duration(self) -> float:
         """Duration of the motion [s]."""
-        return self._law.duration if self.times is None else self.times[-1] - self.times[0]
+        return self._profile.duration if self.times is None else self.times[-1] - self.times[0]
 
     @property
     def knots(self) -> tuple[float, ...]:
         """Times of the points, where higher derivatives may jump, and ends of the phases of the profile [s]."""
         if self.times is not None:
             return tuple(time - self.times[0] for time in self.times)
-        phases, passed = np.array(self._law.knots), self._passed
+        phases, passed = np.array(self._profile.knots), self._passed
         apart = np.abs(passed[:, None] - phases) > _SAME_KNOT * np.abs(self.duration)
         return tuple(np.sort(np.concatenate([phases, passed[apart.all(axis=1)]])).tolist())
 
     @cached_property
     def _passed(self) -> Array:
         """Times at which the profile passes the inner points [s]."""
-        law, at = self._law, self._curve.lengths[1:-1]
-        real = type(law)(*(float(np.real(getattr(law, each.name))) for each in fields(law)))
+        profile, at = self._profile, self._curve.lengths[1:-1]
+        real = type(profile)(*(float(np.real(getattr(profile, each.name))) for each in fields(profile)))
         low, high = np.zeros(at.size), np.full(at.size, real.duration)
         for _ in range(_BISECTIONS):
             middle = 0.5 * (low + high)
             short = real.evaluate(middle)[0] < at
             low, high = np.where(short, middle, low), np.where(short, high, middle)
-        if law == real:
+        if profile == real:
             return low
         # One Newton step carries the complex step of a profile to the times.
-        covered, speed, _ = law.evaluate(low)
+        covered, speed, _ = profile.evaluate(low)
         return low - (covered - at) / speed
 
     def evaluate(self, t: Array) -> PathMotion:
         """Return the motion at times t [s]."""
         if self.times is None:
-            return self._curve.motion(*self._law.evaluate(np.atleast_1d(np.asarray(t, dtype=float))))
+            return self._curve.motion(*self._profile.evaluate(np.atleast_1d(np.asarray(t, dtype=float))))
         return PathMotion(*_rest_to_rest(self._timed, t, self.duration))
 
 

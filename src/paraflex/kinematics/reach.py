@@ -30,7 +30,7 @@ _SCATTERED = 4
 _DEPENDENT = 1e-9
 
 
-class Nearest(NamedTuple):
+class NearestPose(NamedTuple):
     """The pose nearest to a desired position.
 
     Attributes
@@ -127,7 +127,7 @@ class PoseSearch:
     coordinates: NDArray[np.int64]
     signals: Signals
 
-    def nearest(self, t: float, goal: Array, q: Array) -> Nearest:
+    def nearest(self, t: float, goal: Array, q: Array) -> NearestPose:
         """Find the pose nearest to a goal (tasks,) among those near a closed pose q.
 
         Newton's method minimises half the squared distance within the admissible poses, along the null space of Phi_q;
@@ -153,8 +153,8 @@ class PoseSearch:
         angle = self.coordinates == 2
         part = float(np.linalg.norm(off / self._units))
         if part <= REACHED:
-            return Nearest(q, 0.0, 0.0, 0.0)
-        return Nearest(q, float(np.linalg.norm(off[~angle])), float(np.linalg.norm(off[angle])), part)
+            return NearestPose(q, 0.0, 0.0, 0.0)
+        return NearestPose(q, float(np.linalg.norm(off[~angle])), float(np.linalg.norm(off[angle])), part)
 
     def closed(self, t: float, q: Array) -> Array | None:
         """Close the loops by least changes and return the pose; None if they do not close."""
@@ -162,7 +162,7 @@ class PoseSearch:
         pose, phi = assemble(system, self.signals, t, q, self._change_at, longest=_LONGEST_MOVE)
         return pose if closed(system, pose, phi) else None
 
-    def tracked(self, times: Sequence[float] | Array, goals: Array, q: Array) -> list[Nearest]:
+    def tracked(self, times: Sequence[float] | Array, goals: Array, q: Array) -> list[NearestPose]:
         """Find the nearest poses to goals (k, tasks) at times (k,), each from the one before."""
         found = []
         for t, goal in zip(times, goals, strict=True):

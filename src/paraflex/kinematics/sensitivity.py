@@ -15,7 +15,7 @@ from paraflex.kernel.packed import PackedSystem, Signals
 from paraflex.kinematics.closure import PathClosure, RigidMotion
 
 
-class Nearby(NamedTuple):
+class DisplacedClosure(NamedTuple):
     """The closure at one point of a finite difference.
 
     Attributes
@@ -51,7 +51,7 @@ class MotionChange(NamedTuple):
     basis: Array
 
 
-def motion_sensitivity(closure: PathClosure, motion: RigidMotion, nearby: Sequence[Nearby]) -> MotionChange:
+def motion_sensitivity(closure: PathClosure, motion: RigidMotion, nearby: Sequence[DisplacedClosure]) -> MotionChange:
     """Compute the derivatives of the motion of closed loops by a parameter, exact to rounding.
 
     F(x, s) = 0 gives dx = -F_x^-1 F_s for positions, then for velocities, the basis and the accelerations; each stage
@@ -63,7 +63,7 @@ def motion_sensitivity(closure: PathClosure, motion: RigidMotion, nearby: Sequen
         Closure of the motion.
     motion : RigidMotion
         Motion at the nominal parameter.
-    nearby : sequence of Nearby
+    nearby : sequence of DisplacedClosure
         Points of the finite difference.
     """
     zero = MotionChange(*(np.zeros_like(x) for x in (motion.q, motion.v, motion.a, motion.basis)))
@@ -85,7 +85,7 @@ def _solved(jacobians: Array, right: Array) -> Array:
 
 
 def _residual_change(
-    closure: PathClosure, motion: RigidMotion, change: MotionChange, nearby: Sequence[Nearby]
+    closure: PathClosure, motion: RigidMotion, change: MotionChange, nearby: Sequence[DisplacedClosure]
 ) -> tuple[Array, Array]:
     """Return the derivative of the residuals along a change of the motion, and the Jacobians of the motion itself."""
     total = np.zeros((*motion.q.shape, 3 + closure.coordinates.size))

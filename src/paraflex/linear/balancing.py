@@ -18,7 +18,7 @@ _RESOLVED = float(np.sqrt(np.finfo(float).eps))
 _STABLE = 1e-6
 
 
-class Balanced(NamedTuple):
+class BalancedProjection(NamedTuple):
     """Projection of a balanced truncation: x = right z and z = left x.
 
     Attributes
@@ -38,7 +38,7 @@ class Balanced(NamedTuple):
     bound: float
 
 
-def balanced(system: StateSpace, count: int, low: float) -> Balanced:
+def balanced(system: StateSpace, count: int, low: float) -> BalancedProjection:
     """Truncate the least controllable and observable states of the stable part.
 
     Parameters
@@ -80,7 +80,7 @@ def balanced(system: StateSpace, count: int, low: float) -> Balanced:
     U, hankel, V = scipy.linalg.svd(seen.T @ reached)
     kept = min(count - first, int(np.sum(hankel > 0.0)))
     root = np.sqrt(hankel[:kept])
-    return Balanced(
+    return BalancedProjection(
         left=np.vstack([whole[free], left[:neutral], (U[:, :kept] / root).T @ seen.T @ left[neutral:]]),
         right=np.hstack([whole[:, free], right[:, :neutral], right[:, neutral:] @ reached @ (V[:kept].T / root)]),
         hankel=hankel,

@@ -96,8 +96,8 @@ def rubin(mass: Array, stiffness: Array, rows: Array, count: int, typical: float
     bent = (part.held.T @ mass @ modes[:, few]) / held[:, None] * np.maximum(np.abs(squares[few]), lowest)
     bent[:, np.linalg.norm(bent, axis=0) < DEPENDENT] = 0.0
     # Free motions with the interface held come first; other vibrations follow if the modes give too few shapes.
-    wanted = np.hstack([np.diag(1.0 * free), bent, np.eye(free.size)])
-    found = successive(unit_rows(wanted.T), np.zeros((free.size, 0)))[1][:, :count]
+    candidates = np.hstack([np.diag(1.0 * free), bent, np.eye(free.size)])
+    found = successive(unit_rows(candidates.T), np.zeros((free.size, 0)))[1][:, :count]
     turn = scipy.linalg.eigh(found.T @ (part.squares[:, None] * found))[1]
     return Basis(np.hstack([part.static, part.held @ found @ turn]), part.flexibility)
 

@@ -53,7 +53,7 @@ def named_axes(states: Sequence[Variable], inputs: Sequence[Variable], outputs: 
     return names | {f"{key}_unit": (key, [one.unit for one in values]) for key, values in named.items()}
 
 
-class Chosen(NamedTuple):
+class CoordinateChoice(NamedTuple):
     """Choice of minimal coordinates at a pose.
 
     Attributes
@@ -165,7 +165,7 @@ class Coordinates:
         """Joints whose coordinates may become states: with the end-effector's coordinates only the driven ones."""
         return self.joints[len(self.joints) - len(self.driven) :] if self.task else self.joints
 
-    def values(self, chosen: Chosen, q: Array, v: Array) -> Array:
+    def values(self, chosen: CoordinateChoice, q: Array, v: Array) -> Array:
         """Return minimal coordinates, then their rates (k, 2f), from coordinates q and velocities v (k, n)."""
         found = [self._measured(k, q, v) for k in chosen.joints.tolist()]
         found += [(q[:, k], v[:, k]) for k in chosen.bodies.tolist()]
@@ -227,10 +227,10 @@ class Coordinates:
         lam[number >= 0] = point.multipliers[number[number >= 0]]
         whole = self.tangency.at(point._replace(multipliers=lam))
 
-        def rows(wanted: NDArray[np.int64]) -> RowTangents:
-            at = np.searchsorted(whole.rows, wanted)
+        def rows(selected: NDArray[np.int64]) -> RowTangents:
+            at = np.searchsorted(whole.rows, selected)
             parts = (whole.jacobian, whole.rate, whole.second_place, whole.second_rate)
-            return RowTangents(*rows_of(at, *parts), number=number[wanted])
+            return RowTangents(*rows_of(at, *parts), number=number[selected])
 
         # No row of the fictitious pin is a constraint, whether it is a coordinate or not.
         pin = [k for k, name in enumerate(names) if name.startswith(_TASK)]
@@ -239,7 +239,7 @@ class Coordinates:
         acting = rows_of(np.searchsorted(whole.rows, motors), whole.jacobian)[0]
         return PointTangents(whole, rows(holding), rows(coordinates), number[whole.compliant], acting)
 
-    def choose(self, tangents: PointTangents, without: Collection[int] = ()) -> Chosen:
+    def choose(self, tangents: PointTangents, without: Collection[int] = ()) -> CoordinateChoice:
         """Choose minimal coordinates at a pose, with the exception of those of `measured` in `without`.
 
         Raises
@@ -259,12 +259,12 @@ class Coordinates:
         found = choose([constraints, joints[driven], joints[free]], weights)
         states = np.concatenate([free[found.groups[2]], driven[found.groups[1]]])
         bodies = np.setdiff1d(np.arange(self.system.n), found.columns)
-        chosen = Chosen(found.groups[0], states, bodies)
+        chosen = CoordinateChoice(found.groups[0], states, bodies)
         if self.task:
             self._check_task(chosen)
         return chosen
 
-    def _check_task(self, chosen: Chosen) -> None:
+    def _check_task(self, chosen: CoordinateChoice) -> None:
         """Raise an `InputError` if end-effector coordinates depend on others or leave rigid bodies free."""
         rigid = [body.name for body in self.system.bodies
                  if np.isin(chosen.bodies, np.arange(body.offset, body.offset + 3)).any()]  # fmt: skip
@@ -291,7 +291,7 @@ class Coordinates:
             scale[body.flexible] = size / np.hypot(1.0, body.modes.omega / (lowest if np.isfinite(lowest) else 1.0))
         return scale
 
-    def names(self, chosen: Chosen) -> tuple[Variable, ...]:
+    def names(self, chosen: CoordinateChoice) -> tuple[Variable, ...]:
         """Return the states that are coordinates; their rates are states in the same order."""
         quantities = [self.measured[k] for k in chosen.joints.tolist()]
         offsets = np.array([body.offset for body in self.system.bodies])
@@ -346,12 +346,12 @@ def with_coordinates(system: System, joints: Iterable[str], pins: Mapping[str, P
     """
     mechanism, origin = system.mechanism, PointRef(GROUND, _ORIGIN)
     driven = {one.joint for one in mechanism.prescribed}
-    laws = [PrescribedAngle(f"coordinate of {joint}", joint, ConstantSpeed(0.0, 0.0))
+    profiles = [PrescribedAngle(f"coordinate of {joint}", joint, ConstantSpeed(0.0, 0.0))
             for joint in joints if joint not in driven]  # fmt: skip
     pinned = [RevoluteJoint(name, origin, point) for name, point in pins.items()]
     extended = replace(
         mechanism, ground={**mechanism.ground, _ORIGIN: (0.0, 0.0)}, joints=(*mechanism.joints, *pinned),
-        prescribed=(*mechanism.prescribed, *laws), cut=mechanism.cut or Cut(mechanism, {}, {}),
+        prescribed=(*mechanism.prescribed, *profiles), cut=mechanism.cut or Cut(mechanism, {}, {}),
     )  # fmt: skip
     return with_constraints_of(system, extended)
 

@@ -23,7 +23,7 @@ from scipy.sparse import csr_matrix
 from paraflex.arrays import Array, Numbers
 from paraflex.dynamics.sensors import SensorRows
 from paraflex.dynamics.sparse import Factor
-from paraflex.linear.minimal import Minimal
+from paraflex.linear.minimal import MinimalEquations
 
 Complex = NDArray[np.complex128]
 # Seed of the starting vector of Arnoldi's method.
@@ -44,14 +44,14 @@ class Descriptor:
 
     Parameters
     ----------
-    minimal : Minimal
+    minimal : MinimalEquations
         Linearised equations, of which only sparse matrices are used.
     s : complex or float
         Laplace variable [rad/s].
     """
 
-    def __init__(self, minimal: Minimal, s: complex) -> None:
-        self.minimal: Minimal = minimal
+    def __init__(self, minimal: MinimalEquations, s: complex) -> None:
+        self.minimal: MinimalEquations = minimal
         self.s: complex = s
         whole, rows = minimal.tangents.whole, minimal.held_rows
         mass, damping, stiffness = whole.mass, whole.damping, whole.stiffness
@@ -128,7 +128,7 @@ class Descriptor:
         return SmallMotion(q, v, a, multipliers)
 
 
-def response_at(minimal: Minimal, rows: SensorRows, inputs: NDArray[np.int64], s: complex) -> Complex:
+def response_at(minimal: MinimalEquations, rows: SensorRows, inputs: NDArray[np.int64], s: complex) -> Complex:
     """Compute the response (outputs, inputs) of sensors to the given inputs at s."""
     found = Descriptor(minimal, complex(s)).response(inputs)
     out = rows.q @ found.q + rows.v @ found.v + rows.a @ found.a + rows.multipliers @ found.multipliers
@@ -137,7 +137,7 @@ def response_at(minimal: Minimal, rows: SensorRows, inputs: NDArray[np.int64], s
     return out
 
 
-def poles_near(minimal: Minimal, distance: float, count: int) -> Complex:
+def poles_near(minimal: MinimalEquations, distance: float, count: int) -> Complex:
     """Compute the `count` poles nearest to a point on the positive real axis [rad/s], by inverse Arnoldi iteration."""
     at = Descriptor(minimal, distance)
     n = 2 * minimal.chosen.freedoms

@@ -43,7 +43,7 @@ class InputHold(Enum):
     FIRST = "first"
 
 
-class Predicted(NamedTuple):
+class Prediction(NamedTuple):
     """Predicted perturbation: times (k,) [s], states (k, 2f) and outputs (k, outputs)."""
 
     times: Array
@@ -98,7 +98,7 @@ class SampledModel:
     @checked_arguments()
     def predict(
         self, x0: Mapping[str, float] | Array | None = None, du: Mapping[str, float | Array] | Array | None = None
-    ) -> Predicted:
+    ) -> Prediction:
         """Predict the response to small changes of the initial state and of the inputs.
 
         Parameters
@@ -120,7 +120,7 @@ class SampledModel:
         for k in range(self.times.size - 1):
             states[k + 1] = self.Phi[k] @ states[k] + self.Gamma[k] @ u[k] + self.Gamma_next[k] @ u[k + 1]
         outputs = np.einsum("kij,kj->ki", self.C, states) + np.einsum("kij,kj->ki", self.D, u)
-        return Predicted(self.times, states, outputs)
+        return Prediction(self.times, states, outputs)
 
     def to_xarray(self) -> xr.Dataset:
         """Return all matrices as a dataset labelled by time and by names of states, inputs and outputs, with units."""

@@ -20,8 +20,8 @@ from paraflex.dynamics.tangents import MotionPoint
 from paraflex.errors import InputError, as_enum
 from paraflex.kinematics import ModelWithPaths
 from paraflex.limits import solvable
-from paraflex.linear.coordinates import Chosen, Coordinates, FirstCoordinates, Variable, coordinates_of
-from paraflex.linear.minimal import Minimal
+from paraflex.linear.coordinates import CoordinateChoice, Coordinates, FirstCoordinates, Variable, coordinates_of
+from paraflex.linear.minimal import MinimalEquations
 from paraflex.linear.model import LinearModel
 from paraflex.linear.points import planned_point, resting_point, run_point
 from paraflex.mechanism import (
@@ -124,14 +124,14 @@ def linearise(
         The position is singular, so that no coordinates describe the motion.
     """
     return linear_model(
-        *sought_motion(
+        *operating_point(
             source, mode=mode, at=at, assembly=assembly, start=start, balanced=balanced, forces=forces,
             prescribed=prescribed, coordinates=coordinates,
         )
     )  # fmt: skip
 
 
-class Sought(NamedTuple):
+class OperatingPoint(NamedTuple):
     """Arguments of `linear_model` without the choice of coordinates: operating point, inputs and outputs."""
 
     coordinates: Coordinates
@@ -141,7 +141,7 @@ class Sought(NamedTuple):
     unbalanced: float = 0.0
 
 
-def sought_motion(
+def operating_point(
     source: Mechanism | ModelWithPaths | TrackingTask | TrackingRun | MotionRun,
     *,
     mode: str | ActuationMode | None = None,
@@ -152,7 +152,7 @@ def sought_motion(
     forces: Sequence[str] = (),
     prescribed: Sequence[str] = (),
     coordinates: FirstCoordinates | str = FirstCoordinates.MOTORS,
-) -> Sought:
+) -> OperatingPoint:
     """Return the operating point, inputs and outputs of a linear model: see `linearise`."""
     moves = isinstance(source, TrackingTask | TrackingRun | MotionRun)
     others = {"assembly": assembly, "start": start, "balanced": balanced or None} if moves else {"at": at}
@@ -165,8 +165,8 @@ def sought_motion(
     if moves:
         motion, ports, chart = charted(source, mode, forces, prescribed, coordinates)
         point = motion.point(0 if at is None else nearest_sample(motion.times, at))
-        return Sought(chart, point, ports, motion.about)
-    mechanism = Mechanism.made_of(source)
+        return OperatingPoint(chart, point, ports, motion.about)
+    mechanism = Mechanism.from_source(source)
     chosen = mode_of(source, mechanism, mode)
     ports = ports_of(mechanism, chosen, forces, prescribed)
     given = start if start is not None or isinstance(source, Mechanism) else source.start
@@ -177,7 +177,7 @@ def sought_motion(
         state = static_equilibrium(system, state, list(dict.fromkeys(joints)))
     chart = coordinates_of(system, ports.prescribed, as_enum(FirstCoordinates, coordinates, "coordinates"))
     point, unbalanced = resting_point(chart, state, chosen)
-    return Sought(chart, point, ports, "static equilibrium" if balanced else "a pose at rest", unbalanced)
+    return OperatingPoint(chart, point, ports, "static equilibrium" if balanced else "a pose at rest", unbalanced)
 
 
 def linear_model(
@@ -187,7 +187,7 @@ def linear_model(
     about: str,
     unbalanced: float = 0.0,
     *,
-    chosen: Chosen | None = None,
+    chosen: CoordinateChoice | None = None,
 ) -> LinearModel:
     """Linearise at an operating point, in the given minimal coordinates or, by default, in those chosen there."""
     system = coordinates.system
@@ -197,7 +197,7 @@ def linear_model(
         raise InputError("has no freedom to move", field="mechanism", value=mechanism.name, remedy="free a joint")
     motors = [k for k, motor in enumerate(mechanism.motors) if motor.name in ports.mode.motors]
     forces = _forces(system, point.q, tangents.motors[motors], ports.forces)
-    minimal = Minimal(
+    minimal = MinimalEquations(
         system, point, tangents, chosen, coordinates.scale, forces,
         np.array(motors, dtype=int), len(ports.prescribed),
     )  # fmt: skip
@@ -216,14 +216,14 @@ def linear_model(
         outputs=tuple(Variable(sensor.name, mechanism.sensor_unit(sensor)) for sensor in ports.sensors),
         minimal=minimal,
         rows=rows,
-        wanted=(np.arange(len(inputs)), np.arange(len(ports.sensors))),
+        selected=(np.arange(len(inputs)), np.arange(len(ports.sensors))),
     )
 
 
 def charted(
     source: TrackingTask | TrackingRun | MotionRun, mode: str | ActuationMode | None, forces: Sequence[str],
     prescribed: Sequence[str], coordinates: FirstCoordinates | str,
-) -> tuple[Moving, Ports, Coordinates]:  # fmt: skip
+) -> tuple[OperatingPoints, Ports, Coordinates]:  # fmt: skip
     """Return a motion, the inputs and outputs of linear models along it, and their candidate coordinates."""
     task = source.task if isinstance(source, TrackingRun) else source
     mechanism = task.system.mechanism if isinstance(task, MotionRun) else task.mechanism
@@ -258,7 +258,7 @@ def ports_of(mechanism: Mechanism, mode: ActuationMode, forces: Sequence[str], p
     return Ports(mode, points, tuple(prescribed), measured_sensors(in_frames(mechanism)))
 
 
-class Moving(NamedTuple):
+class OperatingPoints(NamedTuple):
     """Planned motion or run: description, system, sample times (k,) [s], and the operating point of each sample."""
 
     about: str
@@ -267,13 +267,13 @@ class Moving(NamedTuple):
     point: Callable[[int], MotionPoint]
 
 
-def moving(source: TrackingTask | TrackingRun | MotionRun, mode: ActuationMode) -> Moving:
+def moving(source: TrackingTask | TrackingRun | MotionRun, mode: ActuationMode) -> OperatingPoints:
     """Return the operating points along a planned motion or a run."""
     if isinstance(source, TrackingTask):
-        return Moving("a planned motion", source.system, source.motion.t, partial(planned_point, source, mode))
+        return OperatingPoints("a planned motion", source.system, source.motion.t, partial(planned_point, source, mode))
     system = source.system if isinstance(source, MotionRun) else source.task.system
     # A run along a path that ends at an event has one more state than torques.
-    return Moving("a run", system, source.solution.t[: len(source.applied)], partial(run_point, source))
+    return OperatingPoints("a run", system, source.solution.t[: len(source.applied)], partial(run_point, source))
 
 
 def nearest_sample(times: Array, at: float) -> int:

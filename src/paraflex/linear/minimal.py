@@ -27,13 +27,13 @@ from paraflex.dynamics import System
 from paraflex.dynamics.sparse import Factor
 from paraflex.dynamics.tangents import MotionPoint
 from paraflex.errors import Moment, SingularPositionError
-from paraflex.linear.coordinates import Chosen, PointTangents, RowTangents
+from paraflex.linear.coordinates import CoordinateChoice, PointTangents, RowTangents
 
 # Coordinates with a larger condition number are singular.
 _SINGULAR = 1e13
 
 
-class Changes(NamedTuple):
+class MotionDerivatives(NamedTuple):
     """Derivatives of the motion, with one column per state of x = (y, y'), then one per input.
 
     Attributes
@@ -56,7 +56,7 @@ class Changes(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Minimal:
+class MinimalEquations:
     """Linearised equations of motion at an operating point in chosen minimal coordinates.
 
     Attributes
@@ -67,7 +67,7 @@ class Minimal:
         Operating point.
     tangents : PointTangents
         Tangent matrices at the operating point.
-    chosen : Chosen
+    chosen : CoordinateChoice
         Minimal coordinates.
     scale : (n,) array
         Unit of each coordinate, for scaling.
@@ -82,7 +82,7 @@ class Minimal:
     system: System
     point: MotionPoint
     tangents: PointTangents
-    chosen: Chosen
+    chosen: CoordinateChoice
     scale: Array
     forces: csr_matrix
     motors: NDArray[np.int64]
@@ -165,7 +165,7 @@ class Minimal:
         return self.coordinates(np.zeros((self.chosen.constraints.size, f)), np.eye(f))
 
     @cached_property
-    def changes(self) -> Changes:
+    def changes(self) -> MotionDerivatives:
         """Derivatives of the motion with respect to states and inputs, dense."""
         Z, whole = self.directions, self.tangents.whole
         turned = np.zeros_like(Z)
@@ -186,7 +186,7 @@ class Minimal:
         multipliers = np.zeros((self.system.m, a.shape[1]))
         multipliers[self.held_rows.number] = kept
         multipliers[self.tangents.compliant, : q.shape[1]] = whole.compliant_place @ q + whole.compliant_rate @ v
-        return Changes(q, v, a, multipliers, second)
+        return MotionDerivatives(q, v, a, multipliers, second)
 
     @cached_property
     def held_rows(self) -> RowTangents:

@@ -22,7 +22,7 @@ from paraflex.errors import InputError
 from paraflex.linear.bases import kernel
 from paraflex.linear.coordinates import Variable
 from paraflex.linear.descriptor import poles_near, response_at
-from paraflex.linear.minimal import Minimal
+from paraflex.linear.minimal import MinimalEquations
 from paraflex.linear.motions import Motions, SecondOrder, driven_equations, modal_damping, motions
 from paraflex.linear.named import NamedModel, not_at_poles, numbers_of, places_in_s
 from paraflex.linear.zeros import StateSpace, Vibrating, by_size, vibrating_zeros, zeros
@@ -53,11 +53,11 @@ class LinearModel(NamedModel):
         forces that hold it.
     states, inputs, outputs : tuple of Variable
         Names and units of states, inputs and outputs.
-    minimal : Minimal
+    minimal : MinimalEquations
         Linearised equations in minimal coordinates.
     rows : SensorRows
         Derivatives of the sensor readings with respect to the motion.
-    wanted : (inputs, outputs) tuple of arrays of int
+    selected : (inputs, outputs) tuple of arrays of int
         Indices of the model's inputs in `minimal` and of its outputs in `rows`.
     """
 
@@ -68,9 +68,9 @@ class LinearModel(NamedModel):
     states: tuple[Variable, ...]
     inputs: tuple[Variable, ...]
     outputs: tuple[Variable, ...]
-    minimal: Minimal
+    minimal: MinimalEquations
     rows: SensorRows
-    wanted: tuple[NDArray[np.int64], NDArray[np.int64]]
+    selected: tuple[NDArray[np.int64], NDArray[np.int64]]
 
     def __repr__(self) -> str:
         return f"LinearModel({self.title}: {len(self.states)} states)"
@@ -99,7 +99,7 @@ class LinearModel(NamedModel):
     @cached_property
     def B(self) -> Array:
         """Input matrix (2f, inputs)."""
-        second = self.minimal.changes.second[:, len(self.states) :][:, self.wanted[0]]
+        second = self.minimal.changes.second[:, len(self.states) :][:, self.selected[0]]
         return np.vstack([np.zeros_like(second), second])
 
     @cached_property
@@ -120,17 +120,17 @@ class LinearModel(NamedModel):
     @cached_property
     def _outputs(self) -> tuple[Array, Array]:
         changes, n = self.minimal.changes, len(self.states)
-        rows = SensorRows(*(part[self.wanted[1]] for part in self.rows))
+        rows = SensorRows(*(part[self.selected[1]] for part in self.rows))
         whole = rows.a @ changes.a + rows.multipliers @ changes.multipliers
         motors = self.minimal.motors
         whole[:, n : n + motors.size] += rows.torques.toarray()[:, motors]
-        return whole[:, :n] + rows.q @ changes.q + rows.v @ changes.v, whole[:, n:][:, self.wanted[0]]
+        return whole[:, :n] + rows.q @ changes.q + rows.v @ changes.v, whole[:, n:][:, self.selected[0]]
 
     @property
     def place_outputs(self) -> Array:
         """Output matrix (outputs, f) of the coordinates y, without accelerations, constraint forces and torques."""
         changes, f = self.minimal.changes, len(self.states) // 2
-        rows = SensorRows(*(part[self.wanted[1]] for part in self.rows))
+        rows = SensorRows(*(part[self.selected[1]] for part in self.rows))
         return rows.q @ changes.q[:, :f] + rows.v @ changes.v[:, :f]
 
     # --- Properties ---------------------------------------------------------------------------------------------------
@@ -363,7 +363,7 @@ class LinearModel(NamedModel):
     @property
     def _displacements(self) -> Array | None:
         """Output matrix (outputs, f) of y, or of one derivative of y per output; None if an output is more general."""
-        rows = SensorRows(*(part[self.wanted[1]] for part in self.rows))
+        rows = SensorRows(*(part[self.selected[1]] for part in self.rows))
         parts = [np.asarray(part @ self.minimal.directions) for part in (rows.q, rows.v, rows.a)]
         mixed = np.sum([np.any(part, axis=1) for part in parts], axis=0) != 1
         if np.any(mixed) or rows.multipliers.nnz or rows.torques.nnz or self.minimal.driven:
@@ -389,10 +389,10 @@ class LinearModel(NamedModel):
         points = places_in_s(frequencies)
         out = np.empty((points.size, len(self.outputs), len(self.inputs)), dtype=complex)
         if self._is_large:
-            rows = SensorRows(*(part[self.wanted[1]] for part in self.rows))
+            rows = SensorRows(*(part[self.selected[1]] for part in self.rows))
             for k, s in enumerate(points):
                 with not_at_poles(s):
-                    out[k] = response_at(self.minimal, rows, self.wanted[0], s)
+                    out[k] = response_at(self.minimal, rows, self.selected[0], s)
             return out
         A, B, C, D = self.scaled
         upper, basis = scipy.linalg.schur(A, output="complex")
@@ -418,7 +418,7 @@ class LinearModel(NamedModel):
             self,
             inputs=tuple(self.inputs[k] for k in chosen[0]),
             outputs=tuple(self.outputs[k] for k in chosen[1]),
-            wanted=(self.wanted[0][chosen[0]], self.wanted[1][chosen[1]]),
+            selected=(self.selected[0][chosen[0]], self.selected[1][chosen[1]]),
         )
 
     @property

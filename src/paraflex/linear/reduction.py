@@ -18,7 +18,7 @@ from paraflex.limits import solvable
 from paraflex.linear.balancing import balanced as balanced_truncation
 from paraflex.linear.bases import Basis, carried, craig_bampton, independent_rows, interpolated, lowest_modes, rubin
 from paraflex.linear.coordinates import Variable
-from paraflex.linear.linearise import linear_model, linearise, sought_motion
+from paraflex.linear.linearise import linear_model, linearise, operating_point
 from paraflex.linear.model import LinearModel
 from paraflex.linear.reduced import ReducedModel, ReductionMethod
 from paraflex.linear.varying import describes
@@ -151,13 +151,13 @@ def _linear_model(source: Source, given: Sequence[ReducedModel], options: dict[s
         return source
     if not given:
         return linearise(source, **options)
-    first, sought = given[0].full, sought_motion(source, **options)
-    same = len(sought.coordinates.measured) > np.max(first.minimal.chosen.joints, initial=-1)
-    if not same or [body.all for body in sought.coordinates.system.bodies] != [
+    first, point = given[0].full, operating_point(source, **options)
+    same = len(point.coordinates.measured) > np.max(first.minimal.chosen.joints, initial=-1)
+    if not same or [body.all for body in point.coordinates.system.bodies] != [
         body.all for body in first.minimal.system.bodies
     ]:
-        raise _of_another(given[0], sought.coordinates.system.mechanism.name)
-    model = linear_model(*sought, chosen=first.minimal.chosen)
+        raise _other_mechanism_error(given[0], point.coordinates.system.mechanism.name)
+    model = linear_model(*point, chosen=first.minimal.chosen)
     _check_alike(given[0], model)
     if not describes(model.minimal, first.minimal):
         raise InputError(
@@ -170,7 +170,7 @@ def _linear_model(source: Source, given: Sequence[ReducedModel], options: dict[s
 def _check_alike(basis: ReducedModel, model: LinearModel) -> None:
     """Raise an `InputError` for a basis of another mechanism or in other coordinates."""
     if [body.all for body in model.minimal.system.bodies] != [body.all for body in basis.full.minimal.system.bodies]:
-        raise _of_another(basis, model.mechanism)
+        raise _other_mechanism_error(basis, model.mechanism)
     if basis.full.states != model.states:
         own = {one.name for one in model.states}
         other = next((one.name for one in basis.full.states if one.name not in own), basis.full.states[0].name)
@@ -180,7 +180,7 @@ def _check_alike(basis: ReducedModel, model: LinearModel) -> None:
         )  # fmt: skip
 
 
-def _of_another(basis: ReducedModel, mechanism: str) -> InputError:
+def _other_mechanism_error(basis: ReducedModel, mechanism: str) -> InputError:
     return InputError(f"belongs to a mechanism with other bodies or motors than {mechanism}", field="basis",
                       value=basis.full.mechanism, remedy="give one of the same mechanism in another pose")  # fmt: skip
 

@@ -24,10 +24,10 @@ from paraflex.dynamics import sensor_readings
 from paraflex.dynamics.tangents import MotionPoint
 from paraflex.errors import InputError, Moment, SingularPositionError, as_enum
 from paraflex.limits import solvable
-from paraflex.linear.coordinates import Chosen, Coordinates, FirstCoordinates, Variable, named_axes
-from paraflex.linear.discrete import InputHold, Predicted, SampledModel, transitions
+from paraflex.linear.coordinates import CoordinateChoice, Coordinates, FirstCoordinates, Variable, named_axes
+from paraflex.linear.discrete import InputHold, Prediction, SampledModel, transitions
 from paraflex.linear.linearise import Ports, charted, linear_model, moving, nearest_sample
-from paraflex.linear.minimal import Minimal
+from paraflex.linear.minimal import MinimalEquations
 from paraflex.linear.model import LinearModel
 from paraflex.mechanism import ActuationMode
 from paraflex.motion import MotionRun
@@ -77,7 +77,7 @@ class VaryingModel:
         States, inputs and outputs of the nominal motion.
     coordinates : Coordinates
         Candidate coordinates.
-    chosen : Chosen
+    chosen : CoordinateChoice
         Minimal coordinates among them, which are states.
     ports : Ports
         Description of inputs and outputs.
@@ -98,7 +98,7 @@ class VaryingModel:
     D: Array
     nominal: Along
     coordinates: Coordinates
-    chosen: Chosen
+    chosen: CoordinateChoice
     ports: Ports
     modal: tuple[Array, Array]
 
@@ -159,7 +159,7 @@ class VaryingModel:
 
     def predict(
         self, x0: Mapping[str, float] | Array | None = None, du: Mapping[str, float | Array] | Array | None = None
-    ) -> Predicted:
+    ) -> Prediction:
         """Predict the response to small changes of the initial state and of the inputs, which are linear in between.
 
         Parameters
@@ -246,14 +246,14 @@ def linearise_along(
 
 def in_one_chart(
     points: Sequence[MotionPoint], coordinates: Coordinates, ports: Ports, about: str, take: Callable[[LinearModel], T]
-) -> tuple[Chosen, list[T]]:
+) -> tuple[CoordinateChoice, list[T]]:
     """Linearise at points of a motion in common minimal coordinates, and apply `take` to each linear model.
 
     The coordinates are those chosen at the first point, unless they are singular at a later one.
 
     Returns
     -------
-    Chosen
+    CoordinateChoice
         Minimal coordinates.
     list
         Results of `take`, one per point.
@@ -286,12 +286,12 @@ def _taken(models: Iterable[LinearModel], take: Callable[[LinearModel], T]) -> l
     return found
 
 
-def describes(minimal: Minimal, elsewhere: Minimal) -> bool:
+def describes(minimal: MinimalEquations, elsewhere: MinimalEquations) -> bool:
     """Return whether coordinates are well-conditioned at a point, without a singular position before another point."""
     return minimal.condition <= _WELL and minimal.orientation == elsewhere.orientation
 
 
-def _given_up(minimal: Minimal, coordinates: Coordinates) -> list[int]:
+def _given_up(minimal: MinimalEquations, coordinates: Coordinates) -> list[int]:
     """Return the coordinate of `measured` to exclude from the states because the coordinates are nearly singular."""
     k = minimal.most_dependent()
     if k is None:
@@ -302,23 +302,23 @@ def _given_up(minimal: Minimal, coordinates: Coordinates) -> list[int]:
     return [number]
 
 
-def _singular(minimal: Minimal, names: Sequence[str]) -> SingularPositionError:
+def _singular(minimal: MinimalEquations, names: Sequence[str]) -> SingularPositionError:
     return SingularPositionError(
         f"no change of coordinates of the linear model belongs to the motion there: {', '.join(names)}",
         Moment(minimal.point.time, 0), remedy="choose other coordinates, or times away from this singular position",
     )  # fmt: skip
 
 
-def _along(points: Sequence[MotionPoint], coordinates: Coordinates, chosen: Chosen, ports: Ports) -> Along:
+def _along(points: Sequence[MotionPoint], coordinates: Coordinates, chosen: CoordinateChoice, ports: Ports) -> Along:
     """Return states, inputs and outputs at points of a motion."""
     mechanism = coordinates.system.mechanism
     t, q, v, a, multipliers, acting = (np.array(part) for part in zip(*points, strict=True))
     torques = acting[:, : len(mechanism.motors)]
-    laws = {one.name: one.law for one in mechanism.prescribed}
+    profiles = {one.name: one.profile for one in mechanism.prescribed}
     inputs = [
         *(torques[:, k] for k, motor in enumerate(mechanism.motors) if motor.name in ports.mode.motors),
         *(np.zeros_like(t) for _ in range(2 * len(ports.forces))),
-        *(laws[name].evaluate(t)[2] for name in ports.prescribed),
+        *(profiles[name].evaluate(t)[2] for name in ports.prescribed),
     ]
     readings = sensor_readings(coordinates.system, q, v, a, multipliers, torques, ports.sensors)
     return Along(coordinates.values(chosen, q, v), np.stack(inputs, axis=1), readings)

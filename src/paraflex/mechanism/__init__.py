@@ -10,7 +10,7 @@ from paraflex.mechanism.actuators import Actuator as Actuator, Amplifier as Ampl
 from paraflex.mechanism.bodies import (
     AssumedModesBeam as AssumedModesBeam,
     Body as Body,
-    BodyReduction as BodyReduction,
+    ComponentModes as ComponentModes,
     Curvature as Curvature,
     FlexibleBeam as FlexibleBeam,
     LumpedMass as LumpedMass,
@@ -44,13 +44,6 @@ from paraflex.mechanism.joints import (
     WeldJoint as WeldJoint,
     points_named as points_named,
 )
-from paraflex.mechanism.laws import (
-    AngleLaw as AngleLaw,
-    ConstantSpeed as ConstantSpeed,
-    PiecewiseLaw as PiecewiseLaw,
-    SampledAngle as SampledAngle,
-    TabulatedLaw as TabulatedLaw,
-)
 from paraflex.mechanism.loads import (
     AppliedTorque as AppliedTorque,
     JointFriction as JointFriction,
@@ -71,6 +64,13 @@ from paraflex.mechanism.members import (
 from paraflex.mechanism.modal import ModalBody as ModalBody, ModalPoint as ModalPoint
 from paraflex.mechanism.payload import Payload as Payload
 from paraflex.mechanism.poses import Pose as Pose, approximate_poses as approximate_poses, placed_poses as placed_poses
+from paraflex.mechanism.profiles import (
+    ConstantSpeed as ConstantSpeed,
+    PiecewiseProfile as PiecewiseProfile,
+    SampledAngle as SampledAngle,
+    TabulatedProfile as TabulatedProfile,
+    TimeProfile as TimeProfile,
+)
 from paraflex.mechanism.quantities import joints_named as joints_named
 from paraflex.mechanism.raparm import raparm_i as raparm_i
 from paraflex.mechanism.rotors import (
@@ -90,7 +90,7 @@ from paraflex.mechanism.sections import (
 from paraflex.mechanism.segments import (
     FIRST_END as FIRST_END,
     LAST_END as LAST_END,
-    Segmented as Segmented,
+    SegmentedMechanism as SegmentedMechanism,
     check_segmentable as check_segmentable,
     finite_segments as finite_segments,
     is_hinge as is_hinge,

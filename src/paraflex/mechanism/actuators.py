@@ -105,15 +105,15 @@ class Actuator(CheckedFields):
             raise self._refused("bandwidth", "has no meaning for a voltage amplifier, whose lag is L/R",
                                 'leave it out, or say amplifier = "current"')  # fmt: skip
 
-    def _needs(self, given: str, asked: bool, *others: str) -> None:
+    def _needs(self, given: str, is_set: bool, *others: str) -> None:
         for other in others:
-            if asked and getattr(self, other) is None:
+            if is_set and getattr(self, other) is None:
                 word = other.replace("_", " ")
                 value = getattr(self, given)
-                said_so = f"{given} = {json.dumps(getattr(value, 'value', value), default=float)}"
+                setting = f"{given} = {json.dumps(getattr(value, 'value', value), default=float)}"
                 raise InputError(
                     "is missing", field=f"actuator.{self.name}.{other}",
-                    remedy=f"give the {word}, which {said_so} needs, or leave that out",
+                    remedy=f"give the {word}, which {setting} needs, or leave that out",
                 )  # fmt: skip
 
     def _refused(self, name: str, problem: str, remedy: str) -> InputError:

@@ -8,7 +8,7 @@ from enum import Enum
 from functools import cached_property
 from typing import TypeVar
 
-from paraflex.arguments import CheckedFields, given_as
+from paraflex.arguments import CheckedFields, named_in_errors
 from paraflex.errors import InputError
 from paraflex.fem import (
     AssumedShapes,
@@ -66,8 +66,8 @@ class Curvature(Enum):
     SEPARATE = "separate"
 
 
-class BodyReduction(Enum):
-    """Reduced basis of a beam.
+class ComponentModes(Enum):
+    """Component modes that a beam keeps as its flexible coordinates (component mode synthesis).
 
     MODAL
         Lowest modes in the beam's frame. They have no moment at an end that the frame does not clamp, so the beam is
@@ -148,7 +148,7 @@ class FlexibleBeam(DeformableBody):
         in the paper. Curvature is always separate where sections of different bending stiffness meet.
     modes : int, optional
         Number of modes of lowest frequency retained as flexible coordinates; all by default.
-    reduction : BodyReduction or str
+    reduction : ComponentModes or str
         Kind of the retained modes: "modal" for modes in the beam's frame (default), or "craig-bampton" for modes with
         the loaded points held, in addition to the static shapes of these points.
     damping : RayleighDamping, ModalDamping or LossFactor, optional
@@ -173,7 +173,7 @@ class FlexibleBeam(DeformableBody):
     damping: Damping | None = None
     flexible: bool = True
     frames: int = 1
-    reduction: BodyReduction = BodyReduction.MODAL
+    reduction: ComponentModes = ComponentModes.MODAL
 
     @cached_property
     def mesh(self) -> BeamMesh:
@@ -306,7 +306,7 @@ class AssumedModesBeam(DeformableBody):
 
 
 Body = RigidBody | FlexibleBeam | AssumedModesBeam | ModalBody
-given_as("a body")(Body)
+named_in_errors("a body")(Body)
 
 
 def given_shapes(bodies: Iterable[Body]) -> list[str]:

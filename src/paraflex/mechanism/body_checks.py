@@ -9,7 +9,7 @@ from typing import TypeVar
 from paraflex.errors import InputError, suggestion
 from paraflex.fem import Polynomial, mesh_beam
 from paraflex.limits import ELEMENTS
-from paraflex.mechanism.bodies import AssumedModesBeam, Body, BodyReduction, FlexibleBeam, RigidBody
+from paraflex.mechanism.bodies import AssumedModesBeam, Body, ComponentModes, FlexibleBeam, RigidBody
 from paraflex.mechanism.damping import Damping, stiffness_damping
 from paraflex.mechanism.modal import ModalBody
 from paraflex.mechanism.quantities import check_numbers, finite, positive
@@ -48,10 +48,10 @@ def check_body(body: Body) -> None:
             n = body.mesh.n_flexible
         _check_frames(body, field)
     check_damping(body.damping, f"{field}.damping")
-    static = isinstance(body, FlexibleBeam) and body.reduction is BodyReduction.CRAIG_BAMPTON
+    static = isinstance(body, FlexibleBeam) and body.reduction is ComponentModes.CRAIG_BAMPTON
     if static and body.modes is None:
         raise InputError(
-            "has no meaning without modes", field=f"{field}.reduction", value=BodyReduction.CRAIG_BAMPTON.value,
+            "has no meaning without modes", field=f"{field}.reduction", value=ComponentModes.CRAIG_BAMPTON.value,
             remedy="give the number of vibrations kept beside the static shapes: modes = 2",
         )  # fmt: skip
     if body.modes is not None and not (0 if static else 1) <= body.modes <= n:

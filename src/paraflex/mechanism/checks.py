@@ -99,7 +99,7 @@ def check_relations(mechanism: Members) -> None:
         for one in members if group.relates else ():
             if len(one.joints) < 2:
                 raise InputError(
-                    f"a {group.word} needs two different joints", field=f"{group.table}.{one.name}.joints",
+                    f"a {group.noun} needs two different joints", field=f"{group.table}.{one.name}.joints",
                     value=", ".join(one.joints), remedy="name the two whose angles or travels are coupled",
                 )  # fmt: skip
 
@@ -118,10 +118,10 @@ def check_assemblies(mechanism: Members) -> None:
             _on_body(ref, field, "the places of ground points are given in [ground]")
         # Raises an error with the name of a body whose angle is not determined.
         approximate_poses(mechanism, assembly)
-        _check_hung(mechanism, assembly)
+        _check_suspended(mechanism, assembly)
 
 
-def _check_hung(mechanism: Members, assembly: Assembly) -> None:
+def _check_suspended(mechanism: Members, assembly: Assembly) -> None:
     """Check that bodies with distance joints only have a position, unless the mechanism was derived from another."""
     hung = [name for name, joints in mechanism.joints_at.items() if {each.holds for each in joints} == {("distance",)}]
     placed = placed_poses(mechanism, assembly) if hung and mechanism.cut is None else hung
@@ -166,7 +166,7 @@ def _check_points_of(mechanism: Members, group: Group, member: Any) -> None:
     field, points = f"{group.table}.{member.name}", points_named(member)
     if "a" in points:
         remedy = "one end must be on another body or on the ground"
-        _two_bodies(mechanism, member.a, member.b, f"{field}.points", f"a {group.word}", remedy)
+        _two_bodies(mechanism, member.a, member.b, f"{field}.points", f"a {group.noun}", remedy)
     for name, point in points.items():
         if name not in ("a", "b"):
             known_point(mechanism, point, f"{field}.{name}")

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from paraflex.arguments import CheckedFields, given_as
+from paraflex.arguments import CheckedFields, named_in_errors
 from paraflex.arrays import Array
 from paraflex.errors import InputError
 from paraflex.mechanism.quantities import in_unit, not_negative, positive
@@ -98,7 +98,7 @@ class LossFactor(CheckedFields):
 
 
 Damping = RayleighDamping | ModalDamping | LossFactor
-given_as("a damping")(Damping)
+named_in_errors("a damping")(Damping)
 
 
 def stiffness_proportional(damping: Damping) -> float | None:

@@ -6,9 +6,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from paraflex.arguments import CheckedFields
-from paraflex.mechanism.quantities import finite, not_zero, optional, said
+from paraflex.mechanism.quantities import field_metadata, finite, not_zero, optional
 
-PHASE = said(
+PHASE = field_metadata(
     "the coordinate of the second joint where that of the first is zero in rad, or m; by default that of the "
     "first assembly",
     finite,
@@ -78,10 +78,10 @@ class Gear(Relation):
     _table = "gear"
 
     name: str
-    first_joint: str = field(metadata=said("first joint", joint="moves"))
-    second_joint: str = field(metadata=said("second joint", joint="moves"))
+    first_joint: str = field(metadata=field_metadata("first joint", joint="moves"))
+    second_joint: str = field(metadata=field_metadata("second joint", joint="moves"))
     ratio: float = field(
-        metadata=said(
+        metadata=field_metadata(
             "the second joint's angle over the first's, negative for external meshing; of a rack the radius of its "
             "pinion",
             not_zero,
@@ -119,7 +119,9 @@ class SumRelation(Relation):
     _table = "relation"
 
     name: str
-    weights: Mapping[str, float] = field(metadata=said("weights of joints' angles and travels", _weigh, joint="moves"))
+    weights: Mapping[str, float] = field(
+        metadata=field_metadata("weights of joints' angles and travels", _weigh, joint="moves")
+    )
     phase: float | None = optional(None, "the sum, by default that of the first assembly", finite)
 
     @property

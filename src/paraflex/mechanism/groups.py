@@ -18,13 +18,13 @@ class Group:
     ----------
     table : str
         Name of the table in files, as in [spring.NAME]; errors quote it.
-    word : str
+    noun : str
         Noun for a member in errors and tables.
     kinds : tuple of type
         Classes of members whose table in a file has the fields of the class. Where there are several, each has a
         `kind`, which is the table's `type`. Without classes `files` reads and writes the table by its own code.
     plural : str
-        Plural of the word, by default the word with an s.
+        Plural of the noun, by default the noun with an s.
     engines : bool
         Whether Exudyn and MuJoCo can represent the members.
     resists : bool
@@ -35,7 +35,7 @@ class Group:
     """
 
     table: str
-    word: str
+    noun: str
     kinds: tuple[type, ...] = ()
     plural: str = ""
     engines: bool = False
@@ -50,17 +50,17 @@ class Group:
     @property
     def one(self) -> str:
         """Noun for a member with its article."""
-        return f"a{'n' if self.word[0] in 'aeiou' else ''} {self.word}"
+        return f"a{'n' if self.noun[0] in 'aeiou' else ''} {self.noun}"
 
     @property
-    def words(self) -> str:
+    def plural_noun(self) -> str:
         """Noun for several members."""
-        return self.plural or f"{self.word}s"
+        return self.plural or f"{self.noun}s"
 
 
-def group(table: str, word: str, *kinds: type, **others: Any) -> Any:
+def group(table: str, noun: str, *kinds: type, **others: Any) -> Any:
     """Return the dataclass field of `Members` for a group, by default empty."""
-    return field(default=(), metadata={"group": Group(table, word, kinds, **others)})
+    return field(default=(), metadata={"group": Group(table, noun, kinds, **others)})
 
 
 @cache

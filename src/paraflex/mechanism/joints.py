@@ -12,15 +12,15 @@ from dataclasses import dataclass, field, fields
 from enum import Enum
 from typing import Any, ClassVar
 
-from paraflex.arguments import CheckedFields, checked_arguments, given_as
+from paraflex.arguments import CheckedFields, checked_arguments, named_in_errors
 from paraflex.errors import InputError
-from paraflex.mechanism.laws import AngleLaw, check_motion
-from paraflex.mechanism.quantities import AT_JOINT, JointThat, finite, optional, positive, said
+from paraflex.mechanism.profiles import TimeProfile, check_motion
+from paraflex.mechanism.quantities import AT_JOINT, JointThat, field_metadata, finite, optional, positive
 
 GROUND = "ground"
 
 
-@given_as("a point", 'a point, "body.point", say "link1.B1"')
+@named_in_errors("a point", 'a point, "body.point", say "link1.B1"')
 @dataclass(frozen=True, order=True)
 class PointRef(CheckedFields):
     """Named point of a body or of the ground, written "link1.B1" or "ground.A1" in files."""
@@ -96,7 +96,7 @@ class _Directions:
     at_end: AtEnd = AtEnd.IGNORE
 
 
-@given_as("a joint", "a joint of any kind, say RevoluteJoint")
+@named_in_errors("a joint", "a joint of any kind, say RevoluteJoint")
 @dataclass(frozen=True)
 class Joint(CheckedFields, _Directions):
     """Joint between point a of one body and point b of another: the base class of all kinds.
@@ -183,9 +183,9 @@ class RevoluteJoint(Joint, kind="revolute", holds=("points",)):
     """
 
 
-_DIRECTION = said("the angle of its axis against the first body in rad", finite)
-_LENGTH = said("the constant distance in m, by default that of the first assembly", positive, "m")
-_ANGLE = said("the angle of the second body against the first in rad", finite)
+_DIRECTION = field_metadata("the angle of its axis against the first body in rad", finite)
+_LENGTH = field_metadata("the constant distance in m, by default that of the first assembly", positive, "m")
+_ANGLE = field_metadata("the angle of the second body against the first in rad", finite)
 
 
 @dataclass(frozen=True)
@@ -265,12 +265,12 @@ class PrescribedAngle(CheckedFields):
 
     name: str
     joint: str = field(metadata=AT_JOINT)
-    law: AngleLaw
+    profile: TimeProfile
 
     def __post_init__(self) -> None:
         super().__post_init__()
         try:
-            check_motion(self.law)
+            check_motion(self.profile)
         except InputError as error:
             raise error.within(f"prescribed.{self.name}") from None
 

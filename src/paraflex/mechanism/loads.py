@@ -7,12 +7,12 @@ from typing import ClassVar
 
 import numpy as np
 
-from paraflex.arguments import CheckedFields, given_as
+from paraflex.arguments import CheckedFields, named_in_errors
 from paraflex.arrays import Array
 from paraflex.errors import InputError
 from paraflex.mechanism.joints import PointRef
-from paraflex.mechanism.laws import AngleLaw, marks
-from paraflex.mechanism.quantities import AT_JOINT, finite, not_negative, optional, positive, said
+from paraflex.mechanism.profiles import TimeProfile, marks
+from paraflex.mechanism.quantities import AT_JOINT, field_metadata, finite, not_negative, optional, positive
 
 
 @dataclass(frozen=True)
@@ -27,7 +27,7 @@ class TorsionalSpring(CheckedFields):
 
     name: str
     joint: str = field(metadata=AT_JOINT)
-    stiffness: float = field(metadata=said("the stiffness in N m/rad", positive, "N m/rad, or N/m"))
+    stiffness: float = field(metadata=field_metadata("the stiffness in N m/rad", positive, "N m/rad, or N/m"))
     rest: float = optional(0.0, "the joint's angle at which the spring is free in rad", finite)
 
 
@@ -43,7 +43,7 @@ class TorsionalDamper(CheckedFields):
 
     name: str
     joint: str = field(metadata=AT_JOINT)
-    coefficient: float = field(metadata=said("the coefficient in N m s/rad", positive, "N m s/rad, or N s/m"))
+    coefficient: float = field(metadata=field_metadata("the coefficient in N m s/rad", positive, "N m s/rad, or N s/m"))
 
 
 @dataclass(frozen=True)
@@ -68,9 +68,9 @@ class JointFriction(CheckedFields):
 
     name: str
     joint: str = field(metadata=AT_JOINT)
-    limit: float = field(metadata=said("the friction torque in N m, or force in N", positive, "N m, or N"))
+    limit: float = field(metadata=field_metadata("the friction torque in N m, or force in N", positive, "N m, or N"))
     speed: float = field(
-        metadata=said("the speed below which it acts as a damper in rad/s or m/s", positive, "rad/s, or m/s")
+        metadata=field_metadata("the speed below which it acts as a damper in rad/s or m/s", positive, "rad/s, or m/s")
     )
 
 
@@ -100,20 +100,23 @@ class LinearSpring(CheckedFields):
     name: str
     a: PointRef
     b: PointRef
-    stiffness: float = field(metadata=said("the stiffness in N/m", not_negative, "N/m"))
+    stiffness: float = field(metadata=field_metadata("the stiffness in N/m", not_negative, "N/m"))
     length: float = optional(0.0, "the free length in m", not_negative, "m")
     damping: float = optional(0.0, "the damping in N s/m", not_negative, "N s/m")
 
 
-InTime = float | AngleLaw
-given_as("a number or a law in time", "a number, or a law in time: PiecewiseLaw, TabulatedLaw, ExpressionLaw")(InTime)
-given_as("two numbers or laws in time", "[x, y], each a number or a law in time")(tuple[InTime, InTime])
+InTime = float | TimeProfile
+named_in_errors(
+    "a number or a profile in time",
+    "a number, or a profile in time: PiecewiseProfile, TabulatedProfile, ExpressionProfile",
+)(InTime)
+named_in_errors("two numbers or profiles in time", "[x, y], each a number or a profile in time")(tuple[InTime, InTime])
 
 
-def _finite_or_law(values: InTime | tuple[InTime, ...], field: str) -> None:
+def _finite_or_profile(values: InTime | tuple[InTime, ...], field: str) -> None:
     """Check that numbers are finite; profiles are checked on evaluation."""
     several = values if isinstance(values, tuple) else (values,)
-    finite([each for each in several if not isinstance(each, AngleLaw)], field)
+    finite([each for each in several if not isinstance(each, TimeProfile)], field)
 
 
 @dataclass(frozen=True)
@@ -125,7 +128,7 @@ class _Load(CheckedFields):
     unit: ClassVar[str]
 
     name: str
-    point: PointRef = field(metadata=said('"body.point"'))
+    point: PointRef = field(metadata=field_metadata('"body.point"'))
 
     @property
     def components(self) -> tuple[InTime, ...]:
@@ -134,9 +137,9 @@ class _Load(CheckedFields):
         return given if isinstance(given, tuple) else (given,)
 
     @property
-    def laws(self) -> tuple[AngleLaw, ...]:
+    def profiles(self) -> tuple[TimeProfile, ...]:
         """Components that are profiles in time."""
-        return tuple(each for each in self.components if isinstance(each, AngleLaw))
+        return tuple(each for each in self.components if isinstance(each, TimeProfile))
 
     def evaluate(self, t: Array) -> Array:
         """Evaluate the components at times t (k,) [s]: (k, 2) of a force [N], (k, 1) of a torque [N m].
@@ -148,7 +151,7 @@ class _Load(CheckedFields):
         """
         try:
             each = [
-                one.evaluate(t)[0] if isinstance(one, AngleLaw) else np.full(t.shape, one) for one in self.components
+                one.evaluate(t)[0] if isinstance(one, TimeProfile) else np.full(t.shape, one) for one in self.components
             ]
         except InputError as error:
             raise error.within(f"load.{self.name}") from None
@@ -156,7 +159,7 @@ class _Load(CheckedFields):
 
     def largest(self, t: Array) -> float:
         """Return the largest magnitude at times t [s] and at the knots and table rows between them [N, N m]."""
-        within = [time for law in self.laws for time in marks(law) if np.min(t) <= time <= np.max(t)]
+        within = [time for profile in self.profiles for time in marks(profile) if np.min(t) <= time <= np.max(t)]
         return float(np.max(np.linalg.norm(self.evaluate(np.concatenate([t, within])), axis=1)))
 
 
@@ -167,7 +170,7 @@ class PointForce(_Load):
     kind: ClassVar[str] = "force"
     unit: ClassVar[str] = "N"
 
-    force: tuple[InTime, InTime] = field(metadata=said("[x, y] in the ground frame in N", _finite_or_law))
+    force: tuple[InTime, InTime] = field(metadata=field_metadata("[x, y] in the ground frame in N", _finite_or_profile))
 
 
 @dataclass(frozen=True)
@@ -177,8 +180,8 @@ class AppliedTorque(_Load):
     kind: ClassVar[str] = "torque"
     unit: ClassVar[str] = "N m"
 
-    torque: InTime = field(metadata=said("the torque in N m", _finite_or_law))
+    torque: InTime = field(metadata=field_metadata("the torque in N m", _finite_or_profile))
 
 
 Load = PointForce | AppliedTorque
-given_as("a load")(Load)
+named_in_errors("a load")(Load)

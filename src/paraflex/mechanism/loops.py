@@ -22,7 +22,7 @@ def loops(mechanism: Mechanism) -> list[tuple[str, ...]]:
     for joint in mechanism.joints:
         if joint.name in in_tree:
             continue
-        up_a, up_b = _way_back(parent, joint.a.body), _way_back(parent, joint.b.body)
+        up_a, up_b = _joints_to_root(parent, joint.a.body), _joints_to_root(parent, joint.b.body)
         while up_a and up_b and up_a[-1] == up_b[-1]:
             up_a.pop()
             up_b.pop()
@@ -48,7 +48,7 @@ def _tree(mechanism: Mechanism) -> dict[str, tuple[str, str] | None]:
     return parent
 
 
-def _way_back(parent: dict[str, tuple[str, str] | None], body: str) -> list[str]:
+def _joints_to_root(parent: dict[str, tuple[str, str] | None], body: str) -> list[str]:
     """Return the joints from a body to the root of its tree, the nearest first."""
     way = []
     while (step := parent[body]) is not None:

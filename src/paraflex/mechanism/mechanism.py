@@ -7,12 +7,12 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from paraflex.arguments import checked_arguments, given_as, refused
+from paraflex.arguments import checked_arguments, named_in_errors, refused
 from paraflex.display import Shown
 from paraflex.errors import InputError, as_enum
 from paraflex.fem import ReferenceCondition
 from paraflex.late import save_file
-from paraflex.mechanism.bodies import Body, BodyReduction, Curvature, FlexibleBeam, RigidBody, given_shapes
+from paraflex.mechanism.bodies import Body, ComponentModes, Curvature, FlexibleBeam, RigidBody, given_shapes
 from paraflex.mechanism.checks import check_mechanism
 from paraflex.mechanism.members import Geometry, Members
 from paraflex.mechanism.payload import Payload, loaded, together
@@ -21,7 +21,7 @@ from paraflex.mechanism.quantities import known
 from paraflex.mechanism.tracks import with_meshes
 
 
-@given_as("a mechanism", "a Mechanism, or the model that paraflex.load reads")
+@named_in_errors("a mechanism", "a Mechanism, or the model that paraflex.load reads")
 @dataclass(frozen=True)
 class Mechanism(Members, Shown):
     """Planar mechanism of rigid and flexible bodies, checked on construction.
@@ -102,7 +102,7 @@ class Mechanism(Members, Shown):
         save_file(self, path)
 
     @classmethod
-    def made_of(cls, given: object) -> Mechanism:
+    def from_source(cls, given: object) -> Mechanism:
         """Return the mechanism of a model, or the given mechanism.
 
         Raises
@@ -161,7 +161,7 @@ class Mechanism(Members, Shown):
         reference: ReferenceCondition | str | None = None,
         curvature: Curvature | str | None = None,
         modes: int | None = None,
-        reduction: BodyReduction | str | None = None,
+        reduction: ComponentModes | str | None = None,
     ) -> Mechanism:
         """Return the mechanism with another mesh, reference condition, curvature or reduction of every flexible beam.
 
@@ -175,7 +175,7 @@ class Mechanism(Members, Shown):
             Continuity of the curvature at lumped moments of inertia.
         modes : int, optional
             Number of modes of lowest frequency that each beam, and each other flexible body, retains.
-        reduction : BodyReduction or str, optional
+        reduction : ComponentModes or str, optional
             Reduction of the beams: "modal" or "craig-bampton".
 
         Raises
@@ -185,12 +185,12 @@ class Mechanism(Members, Shown):
         """
         reference = None if reference is None else as_enum(ReferenceCondition, reference, "reference")
         curvature = None if curvature is None else as_enum(Curvature, curvature, "curvature")
-        asked = {"elements": elements, "reference": reference, "curvature": curvature}
-        changes: dict[str, Any] = {name: value for name, value in asked.items() if value is not None}
+        chosen = {"elements": elements, "reference": reference, "curvature": curvature}
+        changes: dict[str, Any] = {name: value for name, value in chosen.items() if value is not None}
         for what in changes:
             self._refuse_given_shapes(what)
         if reduction is not None:
-            changes |= {"reduction": as_enum(BodyReduction, reduction, "reduction")}
+            changes |= {"reduction": as_enum(ComponentModes, reduction, "reduction")}
             changes |= {} if modes is None else {"modes": modes}
         beams = [body for body in self.bodies if isinstance(body, FlexibleBeam)]
         changed = self.with_bodies(replace(beam, **changes) for beam in beams) if changes else self

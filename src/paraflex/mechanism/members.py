@@ -8,7 +8,7 @@ from enum import Enum
 from functools import cached_property
 from typing import Self
 
-from paraflex.arguments import CheckedFields, checked_arguments, given_as
+from paraflex.arguments import CheckedFields, checked_arguments, named_in_errors
 from paraflex.errors import InputError
 from paraflex.mechanism.actuators import Actuator
 from paraflex.mechanism.bodies import Body
@@ -95,7 +95,7 @@ class ActuationMode(CheckedFields):
 
 
 _MODE = 'a mode by its name, its signs such as "+-+-", or its motors such as "tau1,tau5"'
-given_as("an actuation mode", _MODE)(str | ActuationMode)
+named_in_errors("an actuation mode", _MODE)(str | ActuationMode)
 
 
 class Geometry(Enum):
@@ -113,7 +113,7 @@ class Geometry(Enum):
     SECOND_ORDER = "second-order"
 
 
-@given_as("a mechanism", "a Mechanism, or the model that paraflex.load reads")
+@named_in_errors("a mechanism", "a Mechanism, or the model that paraflex.load reads")
 @dataclass(frozen=True)
 class Members(CheckedFields):
     """Members of a mechanism, looked up by name: the unchecked base of `Mechanism`, which describes the fields.

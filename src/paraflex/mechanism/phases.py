@@ -46,7 +46,7 @@ def _with_phase(mechanism: Members, group: Group, relation: Any) -> Any:
     field, shares = f"{group.table}.{relation.name}.phase", relation.shares
     joints = [mechanism.joint(name) for name in shares]
     remedy = "give it in rad (in m where the second joint slides)"
-    values = _in_first(mechanism, f"a {group.word}'s phase", field, remedy, joint_value, joints)
+    values = _in_first(mechanism, f"a {group.noun}'s phase", field, remedy, joint_value, joints)
     return replace(relation, phase=sum(weight * value for weight, value in zip(shares.values(), values, strict=True)))
 
 

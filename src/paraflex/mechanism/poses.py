@@ -80,12 +80,12 @@ def _from_points(
     known: dict[PointRef, Place] = {PointRef(GROUND, name): place for name, place in mechanism.ground.items()}
     known |= points
     # Other joints do not determine the position of a point.
-    for telling in ({"points"}, {"points", "axis"})[: 1 + sliding]:
+    for determining in ({"points"}, {"points", "axis"})[: 1 + sliding]:
         before = -1
         while before < len(known) + len(poses):
             before = len(known) + len(poses)
             for joint in mechanism.joints:
-                if telling.intersection(joint.holds):
+                if determining.intersection(joint.holds):
                     for one, other in ((joint.a, joint.b), (joint.b, joint.a)):
                         if one in known:
                             known.setdefault(other, known[one])

@@ -56,7 +56,7 @@ def not_zero(value: float, field: str, unit: str) -> None:
     possible(value, field, unit.removeprefix("in "))
 
 
-def said(
+def field_metadata(
     description: str, check: Callable[..., None] | None = None, unit: str = "", *, joint: JointThat | None = None
 ) -> dict[str, Any]:
     """Return the metadata of a member's field for model files, their schema and errors.
@@ -78,7 +78,7 @@ def said(
 
 def optional(default: Any, description: str, check: Callable[..., None] | None = None, unit: str = "") -> Any:
     """Return a dataclass field with a default value and with the metadata of the other arguments."""
-    return field(default=default, metadata=said(description, check, unit))
+    return field(default=default, metadata=field_metadata(description, check, unit))
 
 
 def in_unit(check: Callable[..., None], unit: str) -> dict[str, Any]:
@@ -86,7 +86,7 @@ def in_unit(check: Callable[..., None], unit: str) -> dict[str, Any]:
     return {"check": partial(check, unit=unit)}
 
 
-AT_JOINT = said("the name of a joint", joint="moves")
+AT_JOINT = field_metadata("the name of a joint", joint="moves")
 
 
 def check_numbers(member: Any, place: str) -> None:

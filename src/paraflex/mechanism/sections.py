@@ -7,12 +7,12 @@ from abc import ABC, abstractmethod
 from dataclasses import dataclass, field, fields
 from typing import ClassVar
 
-from paraflex.arguments import CheckedFields, checked_arguments, given_as
+from paraflex.arguments import CheckedFields, checked_arguments, named_in_errors
 from paraflex.errors import InputError
 from paraflex.mechanism.quantities import in_unit, positive
 
 
-@given_as("a shape", "Rectangle(...), Round(...) or Tube(...)")
+@named_in_errors("a shape", "Rectangle(...), Round(...) or Tube(...)")
 @dataclass(frozen=True)
 class Shape(CheckedFields, ABC):
     """Shape of a cross-section: the base class of all kinds. All fields are lengths, `wall` is a wall thickness [m]."""

@@ -30,7 +30,7 @@ LAST_END = "_last"
 
 
 @dataclass(frozen=True)
-class Segmented:
+class SegmentedMechanism:
     """Mechanism of finite segments and the positions of the segments on the beams.
 
     Attributes
@@ -63,7 +63,7 @@ def proportional_segments(mechanism: Mechanism, longest: int = 8) -> dict[str, i
 
 
 @checked_arguments()
-def finite_segments(mechanism: Mechanism, segments: int | Mapping[str, int] = 8) -> Segmented:
+def finite_segments(mechanism: Mechanism, segments: int | Mapping[str, int] = 8) -> SegmentedMechanism:
     """Replace each flexible beam by n equal rigid segments in a row, connected by hinges with springs of n E I / L.
 
     A hinge represents the bending of the two adjacent half segments: k = E I / (L / n), or the reciprocal of
@@ -80,7 +80,7 @@ def finite_segments(mechanism: Mechanism, segments: int | Mapping[str, int] = 8)
 
     Returns
     -------
-    Segmented
+    SegmentedMechanism
         Mechanism of segments, which are named like "link1_1", and their positions.
 
     Raises
@@ -127,7 +127,7 @@ def finite_segments(mechanism: Mechanism, segments: int | Mapping[str, int] = 8)
         name=f"{mechanism.name}, finite segments",
         springs=(*mechanism.springs, *springs), dampers=(*mechanism.dampers, *dampers),
     )  # fmt: skip
-    return Segmented(segmented, carriers)
+    return SegmentedMechanism(segmented, carriers)
 
 
 def moved(member: T, points: Mapping[PointRef, PointRef]) -> T:

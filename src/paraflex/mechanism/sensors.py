@@ -11,13 +11,13 @@ from typing import Any, ClassVar, Literal, Protocol
 
 import numpy as np
 
-from paraflex.arguments import CheckedFields, given_as
+from paraflex.arguments import CheckedFields, named_in_errors
 from paraflex.arrays import Numbers
 from paraflex.errors import InputError, suggestion
 from paraflex.limits import of_size
 from paraflex.mechanism.bodies import AssumedModesBeam, Body, FlexibleBeam
 from paraflex.mechanism.joints import GROUND, Joint, PointRef
-from paraflex.mechanism.quantities import AT_JOINT, finite, known, optional, said
+from paraflex.mechanism.quantities import AT_JOINT, field_metadata, finite, known, optional
 
 # Kinds of sensors by their names in files.
 SENSOR_KINDS: dict[str, type[Sensor]] = {}
@@ -149,7 +149,7 @@ class Location:
         return points[self.at] if isinstance(self.at, str) else self.at
 
 
-@given_as("a sensor", "a sensor of any kind, say Encoder")
+@named_in_errors("a sensor", "a sensor of any kind, say Encoder")
 @dataclass(frozen=True)
 class Sensor(CheckedFields, ABC):
     """Ideal sensor without error or delay: the base class of all kinds.
@@ -290,9 +290,9 @@ class PointSensor(Sensor):
         accelerations are absolute; positions are relative to the origin of the frame.
     """
 
-    point: PointRef = field(metadata=said('"body.point"'))
+    point: PointRef = field(metadata=field_metadata('"body.point"'))
     axis: Literal["x", "y"] | float = field(
-        metadata=said('"x", "y" or the angle of its axis against the x axis in rad', _axis("x", "y"))
+        metadata=field_metadata('"x", "y" or the angle of its axis against the x axis in rad', _axis("x", "y"))
     )
     body: str = optional(GROUND, "the body in whose frame the axis is fixed, by default the ground")
 
@@ -367,8 +367,10 @@ class StrainGauge(Sensor, kind="strain", units=("1",), rigid=False):
         Distance from the neutral axis, positive on the side of the y axis [m]; by default that of the outermost fibre.
     """
 
-    body: str = field(metadata=said("the name of a beam"))
-    at: float | str = field(metadata=said("a named point of the beam, or the distance from its first end in m"))
+    body: str = field(metadata=field_metadata("the name of a beam"))
+    at: float | str = field(
+        metadata=field_metadata("a named point of the beam, or the distance from its first end in m")
+    )
     distance: float | None = optional(
         None,
         "the distance from the neutral axis in m, positive on the side of the y axis, by default that of the "
@@ -432,9 +434,9 @@ class JointForceSensor(Sensor, kind="joint_force", rigid=False):
         slides or the rod of a distance joint (tension); or the "moment" about the point, positive anticlockwise.
     """
 
-    joint: str = field(metadata=said("the name of a joint", joint="exists"))
+    joint: str = field(metadata=field_metadata("the name of a joint", joint="exists"))
     axis: Literal["x", "y", "along", "moment"] | float = field(
-        metadata=said(
+        metadata=field_metadata(
             '"x", "y", "along", "moment" or the angle of its axis in the ground frame in rad',
             _axis("x", "y", "along", "moment"),
         )
@@ -483,9 +485,9 @@ class DeflectionSensor(Sensor, kind="deflection", rigid=False):
         Axis of the body's frame [m], or the rotation of the material, which is a beam's slope [rad].
     """
 
-    point: PointRef = field(metadata=said('"body.point"'))
+    point: PointRef = field(metadata=field_metadata('"body.point"'))
     axis: Literal["x", "y", "angle"] = field(
-        metadata=said('"x", "y" or "angle"', _axis("x", "y", "angle", angle=False))
+        metadata=field_metadata('"x", "y" or "angle"', _axis("x", "y", "angle", angle=False))
     )
 
     def read(self, moving: SensorInputs) -> Numbers:

@@ -9,10 +9,10 @@ from paraflex.arguments import CheckedFields, checked_arguments
 from paraflex.errors import InputError
 from paraflex.mechanism.bodies import RigidBody
 from paraflex.mechanism.joints import PointRef
-from paraflex.mechanism.laws import AngleLaw, ConstantSpeed
 from paraflex.mechanism.mechanism import Mechanism
 from paraflex.mechanism.phases import joint_value
 from paraflex.mechanism.poses import Pose, approximate_poses, placed_poses
+from paraflex.mechanism.profiles import ConstantSpeed, TimeProfile
 from paraflex.mechanism.quantities import known
 
 
@@ -113,12 +113,12 @@ def standing(mechanism: Mechanism, assembly: str | None = None, start: Start | N
 def begun_at(mechanism: Mechanism, value: Callable[[str], float], time: float = 0.0) -> Mechanism:
     """Return the mechanism with prescribed motions whose start is not given set to the joint values at a time [s]."""
 
-    def begun(law: AngleLaw, joint: str) -> AngleLaw:
-        if isinstance(law, ConstantSpeed) and law.from_assembly:
-            return replace(law, angle=value(joint) - time * law.speed)
-        return law
+    def begun(profile: TimeProfile, joint: str) -> TimeProfile:
+        if isinstance(profile, ConstantSpeed) and profile.from_assembly:
+            return replace(profile, angle=value(joint) - time * profile.speed)
+        return profile
 
-    prescribed = tuple(replace(one, law=begun(one.law, one.joint)) for one in mechanism.prescribed)
+    prescribed = tuple(replace(one, profile=begun(one.profile, one.joint)) for one in mechanism.prescribed)
     return mechanism if prescribed == mechanism.prescribed else replace(mechanism, prescribed=prescribed)
 
 

@@ -24,8 +24,8 @@ from paraflex.plots.labels import mathematics
 from paraflex.plots.layout import (
     ONE_COLUMN,
     TWO_COLUMNS,
-    equal_scales_height,
     figure_width,
+    finish_plane,
     is_narrow,
     label_outer_time,
     lay_out,
@@ -54,9 +54,6 @@ _STOPPED: dict[str, Any] = {
     "label": "the run stopped",
 }  # fmt: skip
 _LEVEL: dict[str, Any] = {"color": "0.5", "linestyle": (0, (5, 1.5)), "linewidth": 0.7, "zorder": 1.0}
-# Margin around the curves of a plane as a share of their size, smallest and largest ratio of height to width, and the
-# latter for a figure of two columns.
-_MARGIN, _FLATTEST, _TALLEST, _TALLEST_WIDE = 0.06, 0.3, 1.3, 0.75
 
 
 class _Cell:
@@ -187,14 +184,6 @@ def _columns(entry: CatalogueFigure, count: int, charts: Sequence[Chart]) -> int
     if is_narrow():
         return 1
     return min(count, entry.columns or (1 if charts[0].over_time else 3))
-
-
-def _label_rows(axes: Any) -> None:
-    """Remove the label of the vertical axis from panels beside one with the same label."""
-    for row in axes:
-        for panel in row[1:]:
-            if panel.get_ylabel() == row[0].get_ylabel():
-                panel.set_ylabel("")
 
 
 def _share_scales(axes: Any) -> None:
@@ -355,11 +344,4 @@ def _plane(cell: _Cell, time: Any, most: int) -> Figure:
     panel: Axes = axes[0, 0]
     panel.set_aspect("equal")
     _draw(panel, cell, time, most)
-    box = panel.dataLim
-    width, height = ((1.0 + 2.0 * _MARGIN) * extent for extent in (box.width, box.height))
-    width = max(width, height / (_TALLEST if is_narrow(ONE_COLUMN) else _TALLEST_WIDE)) or 1.0
-    height = max(height, _FLATTEST * width)
-    middle_x, middle_y = box.x0 + 0.5 * box.width, box.y0 + 0.5 * box.height
-    panel.set_xlim(middle_x - 0.5 * width, middle_x + 0.5 * width)
-    panel.set_ylim(middle_y - 0.5 * height, middle_y + 0.5 * height)
-    return lay_out(figure, axes, panel_height=equal_scales_height(figure, panel))
+    return finish_plane(figure, panel)

@@ -17,8 +17,9 @@ from numpy.typing import NDArray
 
 from paraflex.errors import InputError
 from paraflex.figures.shapes import figure_of
+from paraflex.formatting import number
 from paraflex.plots.given import drawn
-from paraflex.plots.labels import plain, three_digits
+from paraflex.plots.labels import plain
 from paraflex.plots.layout import MM, page_width
 from paraflex.plots.marks import LOOKS, by_look, key_arrow, moving_marks, still_marks
 from paraflex.plots.scene import Limits, Scene, default_magnification, is_plate, run_times, scale_bar, scene, select
@@ -235,7 +236,13 @@ def mechanism_drawing(
     title = [shown.mechanism, *([f"mode {plain(shown.mode)}"] if shown.mode else [])]
     figure.text(0.02, 0.985, ", ".join(title), va="top", color=look.ink, fontsize=7.0)
     figure.text(
-        0.98, 0.985, f"t = {three_digits(time)} s, {caption(shown)}", va="top", ha="right", color=look.ink, fontsize=7.0
+        0.98,
+        0.985,
+        f"t = {number(time, 3, padded=True)} s, {caption(shown)}",
+        va="top",
+        ha="right",
+        color=look.ink,
+        fontsize=7.0,
     )
     return figure
 

@@ -1,12 +1,10 @@
-"""Texts of printed figures: mathematics of symbols, labels of axes."""
+"""Texts of printed figures: mathematics of symbols."""
 
 from __future__ import annotations
 
 import re
-from typing import NamedTuple
 
-from paraflex.formatting import GREEK, LONGEST, ROUNDING, printable, text_symbol
-from paraflex.results.metrics import metric_label
+from paraflex.formatting import GREEK, printable, text_symbol
 
 # Letters of symbols in mathematics.
 _LETTERS = {letter: rf"\{name}" for name, letter in GREEK.items()} | {"φ": r"\varphi"}
@@ -18,76 +16,6 @@ _SYMBOL = re.compile(
     rf"(?<![^\W\d_])(?:([{''.join(_LETTERS)}])([\u0307\u0308]?)([₀-₉]*)|([A-Za-z])(?:([\u0307\u0308])([₀-₉]*)|()([₀-₉]+)"
     r"|(?= \[)|(?<=^.)(?=: )))(?![^\W\d_])"
 )
-
-
-class Quantity(NamedTuple):
-    """Quantity of an axis: name, symbol (empty if it has none) and unit."""
-
-    name: str
-    symbol: str
-    unit: str
-
-
-# Quantities of all axes; {} in a symbol stands for the direction.
-QUANTITIES = {
-    "time": Quantity("time", "$t$", "s"),
-    "angle": Quantity("angle", r"$\varphi$", "rad"),
-    "angular_velocity": Quantity("angular velocity", r"$\dot\varphi$", "rad/s"),
-    "angular_acceleration": Quantity("angular acceleration", r"$\ddot\varphi$", "rad/s²"),
-    "position": Quantity("displacement", "${}$", "mm"),
-    "velocity": Quantity("velocity", r"$\dot {}$", "m/s"),
-    "acceleration": Quantity("acceleration", r"$\ddot {}$", "m/s²"),
-    "displacement": Quantity("displacement", "", "mm"),
-    "slope": Quantity("slope", "", "rad"),
-    "error": Quantity("error", "", "mm"),
-    "distance": Quantity("distance", "", "mm"),
-    "speed": Quantity("speed", "", "m/s"),
-    "magnitude": Quantity("acceleration", "", "m/s²"),
-    "torque": Quantity("torque", r"$\tau$", "N m"),
-    "force": Quantity("force", "", "N"),
-    "energy": Quantity("energy", "", "J"),
-    "condition": Quantity("condition number", "", "1"),
-    "flexible": Quantity("modal coordinate", r"$\eta$", "mm kg$^{1/2}$"),
-    "wall_time": Quantity("wall time", "", "s"),
-}
-
-
-def axis_label(quantity: str, *, unit: str | None = None, direction: str = "", short: bool = False) -> str:
-    """Return the label of an axis, "torque τ [N m]"; dimensionless quantities have no brackets.
-
-    Parameters
-    ----------
-    quantity : str
-        Key of `QUANTITIES`.
-    unit : str, optional
-        Unit of the shown values; by default the quantity's own.
-    direction : str
-        Direction "x" or "y" that is inserted into the symbol.
-    short : bool
-        Whether to omit the name if there is a symbol, as below a title that names the quantity.
-    """
-    described = QUANTITIES[quantity]
-    mark = described.symbol.replace("{}", direction)
-    text = " ".join(part for part in ("" if short and mark else described.name, mark) if part)
-    unit = described.unit if unit is None else unit
-    return text if unit == "1" else f"{text} [{unit[:LONGEST]}]"
-
-
-def metric_name(metric: str) -> str:
-    """Return the label of a metric: "RMS tracking error"; "peak torque of tau1" for a metric of one motor."""
-    return plain(metric_label(metric))
-
-
-def effort_label(units: str) -> str:
-    """Return the axis label of motor efforts: torques, forces of linear motors, or both."""
-    if units in ("N m", "N"):
-        return axis_label("torque" if units == "N m" else "force")
-    return f"torque, force [{units}]"
-
-
-def three_digits(value: float) -> str:
-    """Format a value with three significant digits: 48.0, 0.377, 120; zero and rounding errors give 0."""
-    return f"{value:#.3g}".rstrip(".") if not abs(value) < ROUNDING else "0"
 
 
 def symbol(name: str) -> str:

@@ -19,9 +19,10 @@ from matplotlib.axis import Axis
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from paraflex.figures.charts import TIME
 from paraflex.formatting import ROUNDING
 from paraflex.mechanism.quantities import known
-from paraflex.plots.labels import axis_label
+from paraflex.plots.labels import mathematics
 from paraflex.plots.style import STYLE
 
 ONE_COLUMN, TWO_COLUMNS = 84.0, 174.0  # Widths of a journal's columns [mm].
@@ -30,6 +31,9 @@ MM = 1.0 / 25.4  # [inch]
 # Largest height of a figure, that of a page's text, and smallest height of a readable panel, which has priority [mm].
 _PAGE, _LOWEST = 225.0, 9.0
 
+# Margin around a plane as a share of its size, smallest and largest ratio of a panel's height to its width, and the
+# largest for a figure of two columns.
+_MARGIN, _FLATTEST, _TALLEST, _TALLEST_WIDE = 0.06, 0.3, 1.3, 0.75
 # Room for the parts around a panel [mm].
 _EDGE = 1.0
 _LEGEND_LINE = 4.2
@@ -104,7 +108,7 @@ def label_outer_time(axes: NDArray[Any]) -> None:
         for panel in shown[:-1]:
             panel.tick_params(labelbottom=False)
             panel.set_xlabel("")
-        shown[-1].set_xlabel(axis_label("time"))
+        shown[-1].set_xlabel(mathematics(TIME.label(TIME.unit_for(0.0))))
 
 
 def arranged(axes: NDArray[Any]) -> NDArray[Any]:
@@ -186,6 +190,18 @@ def equal_scales_height(figure: Figure, panel: Axes) -> float:
     (left, right), (bottom, top) = panel.get_xlim(), panel.get_ylim()
     _, _, width = _columns(np.array([[panel]]), figure.get_figwidth() / MM)
     return width * (top - bottom) / (right - left)
+
+
+def finish_plane(figure: Figure, axes: Axes) -> Figure:
+    """Set the limits of the only panel, with a margin and a least size for a line or a point, and lay out the figure."""
+    box = axes.dataLim
+    width, height = ((1.0 + 2.0 * _MARGIN) * extent for extent in (box.width, box.height))
+    width = max(width, height / (_TALLEST if is_narrow(ONE_COLUMN) else _TALLEST_WIDE)) or 1.0
+    height = max(height, _FLATTEST * width)
+    middle_x, middle_y = box.x0 + 0.5 * box.width, box.y0 + 0.5 * box.height
+    axes.set_xlim(middle_x - 0.5 * width, middle_x + 0.5 * width)
+    axes.set_ylim(middle_y - 0.5 * height, middle_y + 0.5 * height)
+    return lay_out(figure, np.array([[axes]]), panel_height=equal_scales_height(figure, axes))
 
 
 def _rows(

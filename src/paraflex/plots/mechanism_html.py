@@ -53,7 +53,7 @@ def _counts(mechanism: Mechanism) -> list[tuple[str, Any]]:
         ("assemblies", [assembly.name for assembly in mechanism.assemblies]),
         ("geometry of flexible bodies", mechanism.geometry.value),
         *(
-            (group.words, len(members))
+            (group.plural_noun, len(members))
             for group, members in grouped(mechanism)
             if members and group.table not in _LISTED_GROUPS
         ),

@@ -16,7 +16,6 @@ from paraflex.figures.shapes import figure_of
 from paraflex.formatting import printable
 from paraflex.mechanism import GROUND, Mechanism
 from paraflex.plots.drawing import Sketch
-from paraflex.plots.labels import three_digits
 from paraflex.plots.layout import MM, TWO_COLUMNS, page_width
 from paraflex.plots.marks import moving_marks, still_marks
 from paraflex.plots.model_acting import Acting, acting_arrows, load_places
@@ -201,7 +200,7 @@ def _draw_gravity(axes: Axes, mechanism: Mechanism, limits: Limits, look: Theme)
     ends = np.array([corner - 0.5 * room * weight / size, corner + 0.5 * room * weight / size])
     _arrow(axes, ends[0], ends[1], look.earth, 11.0, 1.4)
     axes.annotate(
-        f"g = {three_digits(size)} m/s²", (corner[0], corner[1]), xytext=(-6.0, 0.0), textcoords="offset points",
+        f"g = {number_text(size, 3, padded=True)} m/s²", (corner[0], corner[1]), xytext=(-6.0, 0.0), textcoords="offset points",
         ha="right", va="center", fontsize=_TEXT - 0.5, color=look.earth,
     )  # fmt: skip
     return [ends, np.array([corner - [0.22 * (limits.right - limits.left), 0.0], corner])]

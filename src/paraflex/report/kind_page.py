@@ -12,7 +12,7 @@ from paraflex.folders.kinds import RESULT_KINDS
 from paraflex.report.page import Page
 from paraflex.report.provenance import asked, command_line, verdict_word
 from paraflex.report.text import sections
-from paraflex.results.doubts import doubt_lines, verdict_of
+from paraflex.results.findings import finding_lines, verdict_of
 from paraflex.results.kinds import kind_of
 
 
@@ -36,5 +36,5 @@ def kind_page(data: xr.Dataset) -> Page:
         more=sections(tables),
         panels=page_panels(kind, data),
         time=data["time"].values if "time" in data.dims else (),
-        notes=doubt_lines(verdict_of(data)),
+        notes=finding_lines(verdict_of(data)),
     )

@@ -21,7 +21,7 @@ from paraflex.report.loads import load_tables, load_tiles
 from paraflex.report.page import Page
 from paraflex.report.provenance import asked, command_line, common_facts, verdict_word
 from paraflex.report.text import pairs, sections, table_pairs
-from paraflex.results.doubts import doubt_lines, finished, verdict_of
+from paraflex.results.findings import finding_lines, finished, verdict_of
 from paraflex.results.kinds import check_kind
 from paraflex.results.loads import load_figures
 from paraflex.results.validity import validity_line, validity_summary
@@ -57,7 +57,7 @@ def motion_page(data: xr.Dataset) -> Page:
         no_film="" if moving else NO_SHAPES,
         notes=[
             *([] if status == "complete" else [f"{status}: {data['message'].item()}"]),
-            *doubt_lines(verdict_of(data)),
+            *finding_lines(verdict_of(data)),
         ],
         remarks=list(filter(None, [validity_line({"": validity_summary(data)})])) if finished(data).all() else [],
     )

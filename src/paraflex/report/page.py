@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from paraflex.arguments import checked_arguments, given_as
+from paraflex.arguments import checked_arguments, named_in_errors
 from paraflex.errors import InputError
 from paraflex.figures.charts import (
     Array,
@@ -47,7 +47,7 @@ _STYLES = ("page.css",)
 _SCRIPTS = ("report.js", "designs.js", "charts.js", "player.js", "start.js")
 
 
-@given_as("a page", "what tracking_page or motion_page returns")
+@named_in_errors("a page", "what tracking_page or motion_page returns")
 @dataclass(frozen=True)
 class Page:
     """Content of a report.

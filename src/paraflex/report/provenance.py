@@ -13,7 +13,7 @@ import xarray as xr
 from paraflex.errors import InputError
 from paraflex.files import library_names
 from paraflex.folders import check_listed
-from paraflex.results.doubts import FINDINGS, finished, verdict_of
+from paraflex.results.findings import FINDINGS, finished, verdict_of
 from paraflex.writing import read_json
 
 # Options of each command that are repeated, in order; "model" stands for the arguments that name it.

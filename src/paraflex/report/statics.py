@@ -19,7 +19,7 @@ from paraflex.report.film import NO_SHAPES, Animation, animation, frames_of
 from paraflex.report.page import Page
 from paraflex.report.provenance import asked, command_line, verdict_word
 from paraflex.report.text import sections
-from paraflex.results.doubts import doubt_lines, verdict_of
+from paraflex.results.findings import finding_lines, verdict_of
 from paraflex.results.kinds import check_kind
 from paraflex.results.statics_data import statics_summary
 from paraflex.results.statics_steps import as_samples, step_kinds
@@ -56,7 +56,7 @@ def statics_page(data: xr.Dataset) -> Page:
         no_film="" if film else NO_SHAPES,
         notes=[
             *([] if summary["status"] == "complete" else [f"{summary['status']}: {summary['message']}"]),
-            *doubt_lines(verdict_of(data)),
+            *finding_lines(verdict_of(data)),
         ],
         remarks=list(filter(None, [validity_line({"": summary["validity"]}), equilibria.no_buckling(data)])),
     )
@@ -81,7 +81,7 @@ def _film(data: xr.Dataset) -> Animation | None:
         return None
     kept = frames_of(steps.sizes["step"])
     kinds, fraction = step_kinds(steps), steps["fraction"].values
-    names = [f"{kinds[k]} at load factor {number(fraction[k], 3)}" for k in kept]
+    names = [f"{kinds[k]} at load factor {number(float(fraction[k]), 3)}" for k in kept]
     return replace(film, time=_times(steps.sizes["step"])[kept], magnify=1.0, moments=names)
 
 

@@ -23,7 +23,7 @@ from paraflex.report.loads import load_tables, load_tiles
 from paraflex.report.page import Page
 from paraflex.report.provenance import asked, command_line, common_facts, summary_beside, verdict_word
 from paraflex.report.text import sections
-from paraflex.results.doubts import doubt_lines, finished, verdict_of
+from paraflex.results.findings import finding_lines, finished, verdict_of
 from paraflex.results.following import headline
 from paraflex.results.kinds import check_kind
 from paraflex.results.loads import load_figures
@@ -81,7 +81,7 @@ def tracking_page(data: xr.Dataset, failed: Mapping[str, str] | None = None) -> 
         selected=runs.index(default_mode(data)),
         film=moving,
         no_film="" if moving else NO_SHAPES,
-        notes=[*_unfinished(data, failed or {}), *doubt_lines(verdict_of(data))],
+        notes=[*_unfinished(data, failed or {}), *finding_lines(verdict_of(data))],
         remarks=[valid] if valid else [],
     )
 

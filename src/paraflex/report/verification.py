@@ -26,7 +26,7 @@ from paraflex.report.film import NO_SHAPES, animation
 from paraflex.report.page import Page
 from paraflex.report.provenance import asked, command_line, common_facts, summary_beside, verdict_word
 from paraflex.report.text import sections
-from paraflex.results.doubts import doubt_lines
+from paraflex.results.findings import finding_lines
 from paraflex.results.following import SPAN_WORDS, ErrorSpan
 from paraflex.results.kinds import check_kind
 
@@ -77,7 +77,7 @@ def verification_page(data: xr.Dataset, summary: Mapping[str, Any]) -> Page:
         selected=models.index(reference),
         film=moving,
         no_film="" if moving else NO_SHAPES,
-        notes=doubt_lines(map(Finding.from_dict, summary.get("verdict", {}).get("findings", [])))
+        notes=finding_lines(map(Finding.from_dict, summary.get("verdict", {}).get("findings", [])))
         + [
             f"Mode {name}, {printed(model)}: {one['message']}"
             for name, mode in summary["modes"].items()

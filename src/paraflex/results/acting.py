@@ -10,8 +10,8 @@ import numpy as np
 from paraflex.arrays import Array
 from paraflex.dynamics import System, joint_coordinate
 from paraflex.formatting import number, quantity
-from paraflex.mechanism import AngleLaw, Load, Mechanism, PrescribedAngle, TabulatedLaw
-from paraflex.mechanism.laws import marks
+from paraflex.mechanism import Load, Mechanism, PrescribedAngle, TabulatedProfile, TimeProfile
+from paraflex.mechanism.profiles import marks
 
 # Number of times at which a profile is evaluated, besides its knots and rows, and the default end of these times [s].
 _LOOKS, _FIRST = 1001, 1.0
@@ -78,7 +78,7 @@ def acting_load(load: Load, duration: float | None = None) -> ActingLoad:
     duration : float, optional
         Duration of the study [s]; by default the first second, or up to the last knot if that is later.
     """
-    times = _times(load.laws, duration)
+    times = _times(load.profiles, duration)
     values = load.evaluate(times)
     sizes = np.linalg.norm(values, axis=1)
     least = _NOTHING * float(sizes.max())
@@ -104,7 +104,7 @@ def _onset(load: Load, before: float, after: float, least: float) -> float:
 
 def drive_speed(drive: PrescribedAngle, slides: bool, duration: float | None = None) -> str:
     """Format the largest speed of a prescribed motion over a study, with its unit."""
-    rates = np.abs(drive.law.evaluate(_times((drive.law,), duration))[1])
+    rates = np.abs(drive.profile.evaluate(_times((drive.profile,), duration))[1])
     constant = np.ptp(rates) <= _NOTHING * rates.max()
     return ("" if constant else "up to ") + _sized(float(rates.max()), "m/s" if slides else "rad/s")
 
@@ -112,7 +112,7 @@ def drive_speed(drive: PrescribedAngle, slides: bool, duration: float | None = N
 def first_movements(mechanism: Mechanism, duration: float | None = None) -> dict[str, int]:
     """Return the signs of the first movement of joints with prescribed motions, 0 for joints at rest."""
     return {
-        drive.joint: _first_sign(drive.law.evaluate(_times((drive.law,), duration))[1], _NOTHING)
+        drive.joint: _first_sign(drive.profile.evaluate(_times((drive.profile,), duration))[1], _NOTHING)
         for drive in mechanism.prescribed
     }
 
@@ -144,14 +144,14 @@ def _sized(value: float, unit: str) -> str:
     return quantity(value, unit, digits=4, padded=False)
 
 
-def _times(laws: tuple[AngleLaw, ...], duration: float | None) -> Array:
+def _times(profiles: tuple[TimeProfile, ...], duration: float | None) -> Array:
     """Return the times at which profiles are evaluated: all knots, and a grid over the study up to the end of tables.
 
     Without a duration [s] the grid covers the first second, or up to the last knot if that is later.
     """
-    known = [time for law in laws for time in marks(law)]
+    known = [time for profile in profiles for time in marks(profile)]
     end = max([_FIRST, *known]) if duration is None else duration
-    end = min([end, *(law.times[-1] for law in laws if isinstance(law, TabulatedLaw))])
+    end = min([end, *(profile.times[-1] for profile in profiles if isinstance(profile, TabulatedProfile))])
     return np.unique([*np.linspace(0.0, end, _LOOKS), *(time for time in known if 0.0 <= time <= end)])
 
 

@@ -24,11 +24,11 @@ INTERNAL = "internal_torque"
 # Dimensions of a controller NAME, as KIND_NAME; the coordinate of SAMPLE holds the sample times.
 SAMPLE, INPUT, OUTPUT = "sample", "input", "output"
 # Variables of a controller, as KIND_NAME: dimension in addition to that of samples, and meaning.
-READINGS, WANTED, GIVEN = "reading", "wanted_torque", "given_torque"
+READINGS, REQUESTED, APPLIED = "reading", "wanted_torque", "given_torque"
 _VARIABLES = {
     READINGS: (INPUT, "reading of a sensor that the law receives, quantised and filtered"),
-    WANTED: (OUTPUT, "torque of the law"),
-    GIVEN: (OUTPUT, "torque within the limits"),
+    REQUESTED: (OUTPUT, "torque of the law"),
+    APPLIED: (OUTPUT, "torque within the limits"),
 }
 _ACTS = "acts after the delay, from one sample to the next; on the joint's second body, as `torque`"
 
@@ -66,12 +66,12 @@ class ControllerData:
     @property
     def limited(self) -> xr.DataArray:
         """Boolean array of the samples at which a limit was active."""
-        return (self.data[WANTED] != self.data[GIVEN]).where(self.data[GIVEN].notnull(), False).any(OUTPUT)
+        return (self.data[REQUESTED] != self.data[APPLIED]).where(self.data[APPLIED].notnull(), False).any(OUTPUT)
 
     @property
     def samples(self) -> xr.DataArray:
         """Number of samples of each run."""
-        return self.data[GIVEN].notnull().any(OUTPUT).sum(SAMPLE)
+        return self.data[APPLIED].notnull().any(OUTPUT).sum(SAMPLE)
 
 
 def dimension(kind: str, controller: str) -> str:
@@ -132,7 +132,9 @@ def _controller(
         for row, one in zip(values, runs, strict=True):
             if one is not None:
                 columns = [list(labels[kind]).index(label) for label in (one.inputs if kind == INPUT else one.outputs)]
-                row[: one.t.size, columns] = {READINGS: one.readings, WANTED: one.wanted, GIVEN: one.given}[variable]
+                row[: one.t.size, columns] = {READINGS: one.readings, REQUESTED: one.requested, APPLIED: one.applied}[
+                    variable
+                ]
         dims = ("mode", dimension(SAMPLE, name), dimension(kind, name))
         units = list(labels[kind].values())
         array = xr.DataArray(values, {dims[2]: list(labels[kind])}, dims)
@@ -214,5 +216,5 @@ def controller_figures(run: xr.Dataset) -> dict[str, Any]:
 def _torque(one: ControllerData, motor: str) -> dict[str, Any]:
     lowest, highest = one.limits[motor]
     most = {f"{key}_max": largest(one.data[name].sel({OUTPUT: motor}).values)
-            for key, name in (("wanted", WANTED), ("given", GIVEN))}  # fmt: skip
+            for key, name in (("wanted", REQUESTED), ("given", APPLIED))}  # fmt: skip
     return {"unit": one.units[motor], **most, "lowest": lowest, "highest": highest, "rate": one.rates[motor]}

@@ -16,8 +16,8 @@ from paraflex.integrators import IntegrationOptions
 from paraflex.kinematics import Path, length_fraction
 from paraflex.results.acting import load_variables
 from paraflex.results.controllers import INTERNAL, with_controllers
-from paraflex.results.doubts import MODE, keep_findings
-from paraflex.results.following import KEPT_METRICS, ErrorSpan, Part, metric_variables, too_short
+from paraflex.results.findings import MODE, keep_findings
+from paraflex.results.following import KEPT_METRICS, ErrorSpan, PathPart, metric_variables, too_short
 from paraflex.results.labelled import (
     Variables,
     error_variables,
@@ -31,7 +31,7 @@ from paraflex.results.labelled import (
 from paraflex.results.record import BRAKE_ENERGY, RUN_FIGURES, Record, record
 from paraflex.results.validity import validity_variables
 from paraflex.tracking import TrackingRun
-from paraflex.validity import doubtful_numbers
+from paraflex.validity import implausible_numbers
 
 
 @checked_arguments()
@@ -126,7 +126,7 @@ def tracking_dataset(
 def _findings(records: Sequence[Record]) -> Iterator[Finding]:
     """Yield findings on the numbers of the mechanism, and on each run."""
     task = records[0].task
-    yield from doubtful_numbers(task.mechanism)
+    yield from implausible_numbers(task.mechanism)
     part = part_of(task.path, float(task.motion.t[-1]))
     if part is not None:
         yield part.finding()
@@ -134,7 +134,7 @@ def _findings(records: Sequence[Record]) -> Iterator[Finding]:
     for validity, mode in sorted(beyond, key=lambda pair: -pair[0].ratio):
         yield validity.finding(f"{MODE}{mode}")
     for one in records:
-        yield from one.doubts
+        yield from one.findings
 
 
 def _frame(one: Record) -> Variables:
@@ -149,6 +149,6 @@ def _frame(one: Record) -> Variables:
     }
 
 
-def part_of(path: Path, end: float) -> Part | None:
+def part_of(path: Path, end: float) -> PathPart | None:
     """Return the part of a path covered by runs that end at a time [s]; None if they reach the end of the path."""
-    return Part(end, path.duration, length_fraction(path, end)) if too_short(end, path.duration) else None
+    return PathPart(end, path.duration, length_fraction(path, end)) if too_short(end, path.duration) else None

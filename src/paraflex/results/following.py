@@ -154,7 +154,7 @@ def ranked_by_motion(data: xr.Dataset) -> bool:
 
 
 @dataclass(frozen=True)
-class Part:
+class PathPart:
     """Part of a path that runs covered which ended before the path.
 
     Attributes
@@ -189,12 +189,12 @@ def too_short(end: float, path_duration: float) -> bool:
     return end < path_duration * (1.0 - SAME_TIME)
 
 
-def part_run(data: xr.Dataset) -> Part | None:
+def part_run(data: xr.Dataset) -> PathPart | None:
     """Return the part of the path that the runs of a dataset covered; None if they reached its end."""
     end, path = float(data["time"].values[-1]), float(data.attrs.get("motion_end", 0.0))
     if "path_length_run" not in data.attrs or not too_short(end, path):
         return None
-    return Part(end, path, float(data.attrs["path_length_run"]))
+    return PathPart(end, path, float(data.attrs["path_length_run"]))
 
 
 @checked_arguments()

@@ -16,7 +16,7 @@ _DRIFT_DEGREE = 2
 # Fewer samples after the motion do not distinguish a vibration from a drift.
 _FEWEST_SAMPLES = 3 * (_DRIFT_DEGREE + 1)
 # Band of the settling time about the desired position, as a fraction of the largest tracking error.
-SETTLED = 0.05
+SETTLING_BAND = 0.05
 # Desired positions within this fraction of the largest distance from the end of the path do not define its direction.
 _NEAR_END = 1e-6
 
@@ -86,12 +86,12 @@ def settling_time(t: Numbers, distance: Numbers, motion_end: float, band: float 
     motion_end : float
         End of the motion [s].
     band : float, optional
-        Width of the band [m]; by default the fraction `SETTLED` of the largest distance.
+        Width of the band [m]; by default the fraction `SETTLING_BAND` of the largest distance.
     """
     moving = during_motion(t, motion_end)
     if moving.all() or not np.isfinite(distance).all():
         return np.nan
-    band = SETTLED * float(distance.max()) if band is None else band
+    band = SETTLING_BAND * float(distance.max()) if band is None else band
     first = max(int(np.sum(moving)) - 1, 0)
     times, rest = t[first:], distance[first:]
     outside = np.flatnonzero(rest > band)

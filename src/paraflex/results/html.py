@@ -12,7 +12,7 @@ from paraflex.formatting import number, quantity
 from paraflex.integrators import Solution
 from paraflex.integrators.methods import title_of
 from paraflex.late import view
-from paraflex.mechanism import AngleLaw, PointRef
+from paraflex.mechanism import PointRef, TimeProfile
 from paraflex.motion import MotionRun
 from paraflex.results.metrics import METRICS
 from paraflex.results.outlines import deflections
@@ -62,7 +62,9 @@ def motion_run_html(run: MotionRun) -> str:
         shown = [ref for ref in names if "._" not in str(ref)][:_MOST_LISTED]
         points = [(str(ref), *map(float, point_motion(system, ref, *last).position[0])) for ref in shown]
     given = {
-        name: "in time" if isinstance(law, AngleLaw) else number(law) for name, law in run.torques.items() if law != 0.0
+        name: "in time" if isinstance(law, TimeProfile) else number(law)
+        for name, law in run.torques.items()
+        if law != 0.0
     }
     torques = [f"{name} {value}" for name, value in given.items()]
     return page(

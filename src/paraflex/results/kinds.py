@@ -6,13 +6,13 @@ from collections.abc import Iterable
 
 import xarray as xr
 
-from paraflex.arguments import checked_arguments, given_as
+from paraflex.arguments import checked_arguments, named_in_errors
 from paraflex.errors import InputError
 from paraflex.folders import RESULT_KINDS
 
-given_as("a dataset of results", "a dataset: what tracking_dataset or open_results returns, or the data of a study")(
-    xr.Dataset
-)
+named_in_errors(
+    "a dataset of results", "a dataset: what tracking_dataset or open_results returns, or the data of a study"
+)(xr.Dataset)
 
 
 @checked_arguments()
@@ -21,7 +21,7 @@ def kind_of(data: xr.Dataset) -> str:
     if "model" in data.dims:
         return "verification"
     kind = str(data.attrs.get("kind"))
-    return kind if kind in RESULT_KINDS and RESULT_KINDS[kind].made_by else "tracking"
+    return kind if kind in RESULT_KINDS and RESULT_KINDS[kind].producers else "tracking"
 
 
 def check_kind(data: xr.Dataset, *kinds: str) -> None:
@@ -41,8 +41,8 @@ def check_kind(data: xr.Dataset, *kinds: str) -> None:
 
 def wrong_kind(kind: str, kinds: Iterable[str], field: str = "data") -> InputError:
     """Return the error for results of a wrong kind."""
-    wanted = list(kinds)
-    makers = [kind.made_by for kind in (RESULT_KINDS.get(each) for each in wanted) if kind and kind.made_by]
-    remedy = "give those of the kind " + " or ".join(f'"{each}"' for each in wanted)
-    remedy += f", as {' or '.join(makers)} makes them" if len(makers) == len(wanted) else ""
+    expected = list(kinds)
+    makers = [kind.producers for kind in (RESULT_KINDS.get(each) for each in expected) if kind and kind.producers]
+    remedy = "give those of the kind " + " or ".join(f'"{each}"' for each in expected)
+    remedy += f", as {' or '.join(makers)} makes them" if len(makers) == len(expected) else ""
     return InputError(f'these are results of the kind "{kind}"', field=field, remedy=remedy)

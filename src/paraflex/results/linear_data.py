@@ -139,10 +139,10 @@ def zero_maps(model: LinearModel) -> dict[str, Complex]:
     motors, outputs = motors_of(model), [one.name for one in model.outputs]
     joints = {motor.name: motor.joint for motor in mechanism.motors}
     inputs = motors or [one.name for one in model.inputs]
-    wanted = {ENCODERS: [joints[name] for name in motors], END_EFFECTOR: end_effector_outputs(model)}
+    requested = {ENCODERS: [joints[name] for name in motors], END_EFFECTOR: end_effector_outputs(model)}
     return {
         name: model.zeros(inputs, chosen)
-        for name, chosen in wanted.items()
+        for name, chosen in requested.items()
         if chosen and all(one in outputs for one in chosen)
     }
 

@@ -165,11 +165,11 @@ def stacked_motions(points: Sequence[PointMotion], samples: int) -> PointMotion:
     return PointMotion(*(stacked([each[k] for each in points], samples, 2) for k in range(3)))
 
 
-def _by_name(values: Array, names: Sequence[str], wanted: Sequence[str]) -> Array:
+def _by_name(values: Array, names: Sequence[str], order: Sequence[str]) -> Array:
     """Return columns (k, wanted) of values (k, names) in the order of `wanted`; NaN for names that are missing."""
     place = {name: k for k, name in enumerate(names)}
-    out = np.full((len(values), len(wanted)), np.nan)
-    for k, name in enumerate(wanted):
+    out = np.full((len(values), len(order)), np.nan)
+    for k, name in enumerate(order):
         if name in place:
             out[:, k] = values[:, place[name]]
     return out

@@ -74,7 +74,7 @@ class Metric:
         Whether the metric is zero without motors.
     kept_of : tuple of str, optional
         Kinds of runs for which the metric is kept unless metrics are named; by default all that have it.
-    judged : bool
+    ranked : bool
         Whether a smaller value is better, so that designs can be selected by the metric.
     member : str
         Single member of an expression; empty for other metrics.
@@ -93,7 +93,7 @@ class Metric:
     runs: tuple[str, ...] = (PATH, MOTION)
     of_motors: bool = False
     kept_of: tuple[str, ...] | None = None
-    judged: bool = True
+    ranked: bool = True
     member: str = ""
 
     def value(self, traces: Any) -> Any:
@@ -169,7 +169,7 @@ def _saturated_share(controllers: Sequence[ControllerRecord]) -> float:
     return sum(int(np.sum(one.limited)) for one in controllers) / samples if samples else 0.0
 
 
-def _as_it_is(formula: Callable[[Any], Any]) -> Formula:
+def _absolute(formula: Callable[[Any], Any]) -> Formula:
     """Return a formula that does not depend on the nominal run."""
     return lambda run, _: formula(run)
 
@@ -266,17 +266,17 @@ def _safety_factor(run: Any, nominal: Any) -> Any:
 
 def _of_the_solver(name: str, meaning: str, unit: str = "1", *, whole: bool = False) -> Metric:
     """Return the metric that is the solution's attribute of the same name."""
-    formula = _as_it_is(lambda x: getattr(x.solution, name))
+    formula = _absolute(lambda x: getattr(x.solution, name))
     return Metric(name, meaning, unit, formula, smooth=False, of_solver=True, whole=whole)
 
 
 def _of_statics(
     name: str, meaning: str, unit: str, formula: Callable[[Any], Any], label: str = "", *, each: str = "",
-    whole: bool = False, judged: bool = False,
+    whole: bool = False, ranked: bool = False,
 ) -> Metric:  # fmt: skip
     """Return a metric of static equilibria, by default one that does not rank designs."""
-    return Metric(name, meaning, unit, _as_it_is(formula), label, each=each, smooth=False, whole=whole,
-                  runs=(STATICS,), judged=judged)  # fmt: skip
+    return Metric(name, meaning, unit, _absolute(formula), label, each=each, smooth=False, whole=whole,
+                  runs=(STATICS,), ranked=ranked)  # fmt: skip
 
 
 def _peaks(values: Trace) -> Trace:
@@ -295,51 +295,51 @@ _AWAY = "distance of the end-effector from its desired place"
 # Columns of tables have this order.
 _ALL = (
     Metric("tracking_rms_motion", f"root mean square {_AWAY} during the motion", "m",
-           _as_it_is(lambda x: rms(x.distance[x.moving])), "RMS error in the motion", kept=True, runs=(PATH,)),
+           _absolute(lambda x: rms(x.distance[x.moving])), "RMS error in the motion", kept=True, runs=(PATH,)),
     Metric("tracking_max_motion", f"largest {_AWAY} during the motion", "m",
            _largest(lambda x: x.distance[x.moving]), "largest error in the motion", kept=True, runs=(PATH,)),
     Metric("tracking_rms_after", f"root mean square {_AWAY} after the motion", "m",
-           _as_it_is(lambda x: rms(x.distance[~x.moving])), "RMS error after the motion", kept=True, runs=(PATH,)),
+           _absolute(lambda x: rms(x.distance[~x.moving])), "RMS error after the motion", kept=True, runs=(PATH,)),
     Metric("tracking_max_after", f"largest {_AWAY} after the motion", "m",
            _largest(lambda x: x.distance[~x.moving]), "largest error after the motion", kept=True, runs=(PATH,)),
     Metric("tracking_rms", f"root mean square {_AWAY} over the whole run, dwell included", "m",
-           _as_it_is(lambda x: rms(x.distance)), "RMS tracking error", kept=True, runs=(PATH,)),
+           _absolute(lambda x: rms(x.distance)), "RMS tracking error", kept=True, runs=(PATH,)),
     Metric("tracking_max", f"largest {_AWAY} over the whole run", "m",
            _largest(lambda x: x.distance), "largest tracking error", kept=True, runs=(PATH,)),
     Metric("residual_vibration", "root mean square distance of the end-effector from its drift after the motion", "m",
-           _as_it_is(lambda x: vibration(*x.after)), "residual vibration", kept=True, runs=(PATH,)),
+           _absolute(lambda x: vibration(*x.after)), "residual vibration", kept=True, runs=(PATH,)),
     Metric("drift_speed", "mean speed of the end-effector's drift after the motion", "m/s",
-           _as_it_is(lambda x: drift_speed(*x.after)), "drift after the motion", kept=True, runs=(PATH,)),
+           _absolute(lambda x: drift_speed(*x.after)), "drift after the motion", kept=True, runs=(PATH,)),
     Metric("settling_time", "time from the end of the motion until the end-effector stays as near to its desired place "
            "as 5 % of the largest tracking error", "s",
-           _as_it_is(lambda x: settling_time(x.t, x.distance, x.motion_end)), "settling time", smooth=False, kept=True,
+           _absolute(lambda x: settling_time(x.t, x.distance, x.motion_end)), "settling time", smooth=False, kept=True,
            runs=(PATH,), kept_of=()),
     Metric("overshoot", "how far the end-effector goes beyond the end of its path, in the direction of arrival", "m",
-           _as_it_is(lambda x: overshoot(x.position, x.desired, x.moving)), "overshoot", smooth=False, kept=True,
+           _absolute(lambda x: overshoot(x.position, x.desired, x.moving)), "overshoot", smooth=False, kept=True,
            runs=(PATH,), kept_of=()),
     Metric("deflection_max", "largest deflection of any body from its chord, the line between its ends", "m",
            _largest_magnitude(lambda x: x.deflection), "largest deflection", runs=_ANY),
     Metric("peak_torque_max", "largest magnitude of any motor's torque", "N m",
            _largest_magnitude(lambda x: x.torque), "peak torque", of_motors=True),
     Metric("rms_torque_norm", "root mean square of the torques' Euclidean norm", "N m",
-           _as_it_is(lambda x: np.sqrt(np.mean(np.sum(x.torque**2, axis=1)))), "RMS torque",
+           _absolute(lambda x: np.sqrt(np.mean(np.sum(x.torque**2, axis=1)))), "RMS torque",
            of_motors=True),
     Metric("peak_torque", "largest magnitude of each motor's torque", "N m",
            _largest_of_each(lambda x: x.torque), "peak torque", each=MOTOR, kept=True),
     Metric("rms_torque", "root mean square of each motor's torque", "N m",
-           _as_it_is(lambda x: rms(x.torque)), "RMS torque", each=MOTOR, kept=True),
+           _absolute(lambda x: rms(x.torque)), "RMS torque", each=MOTOR, kept=True),
     Metric("work", "work done on the mechanism until the end, less what dampers take", "J",
-           _as_it_is(lambda x: x.solution.work[-1])),
+           _absolute(lambda x: x.solution.work[-1])),
     Metric("motor_energy", "integral of the magnitudes of all motors' powers, from the samples", "J",
            lambda run, nominal: integral(run.t, np.sum(np.sign(nominal.power) * run.power, axis=1)),
            "energy of the motors", of_motors=True),
     Metric("motor_power_max", "largest magnitude of any motor's power", "W",
            _largest_magnitude(lambda x: x.power), "largest motor power", of_motors=True),
     Metric("internal_torque_max", "largest Euclidean norm of the part of the torques that only strains links", "N m",
-           _as_it_is(lambda x: largest_norm(x.internal_torque)), "largest internal torque", smooth=False,
+           _absolute(lambda x: largest_norm(x.internal_torque)), "largest internal torque", smooth=False,
            runs=(PATH,), of_motors=True, kept_of=()),
     Metric("saturated_share", "share of the samples of controllers at which a limit of torques was met", "1",
-           _as_it_is(lambda x: _saturated_share(x.controllers)), smooth=False, of_motors=True, kept_of=()),
+           _absolute(lambda x: _saturated_share(x.controllers)), smooth=False, of_motors=True, kept_of=()),
     Metric("current_max", "largest magnitude of each motor's current, by its actuator", "A",
            _of_currents(lambda x: _peaks(x.current)), "largest current", each=MOTOR, smooth=False, kept_of=()),
     Metric("rms_current", "root mean square of each motor's current in time", "A",
@@ -355,9 +355,9 @@ _ALL = (
     Metric("joint_force_max", "largest force in any joint", "N",
            _largest(lambda x: x.joint_force), "largest joint force", runs=_ANY, kept_of=(MOTION, STATICS)),
     Metric("drive_torque_error", "error of integration of each prescribed motion's torque or force, at most", "N m",
-           _as_it_is(lambda x: x.load_errors.drive), "error of the torque", each=DRIVE, smooth=False, kept_of=()),
+           _absolute(lambda x: x.load_errors.drive), "error of the torque", each=DRIVE, smooth=False, kept_of=()),
     Metric("joint_force_error", "error of integration of the force in any joint, at most", "N",
-           _as_it_is(lambda x: np.max(x.load_errors.force, initial=0.0)), "error of the joint force", smooth=False,
+           _absolute(lambda x: np.max(x.load_errors.force, initial=0.0)), "error of the joint force", smooth=False,
            kept_of=()),
     Metric("joint_speed_max", "largest magnitude of the rate of each joint's angle or travel", "rad/s",
            _largest_of_each(lambda x: x.joint_speed), "largest speed", each=JOINT, kept_of=()),
@@ -368,38 +368,38 @@ _ALL = (
     Metric("stress_max", "largest magnitude of the stress in any beam, bending and axial; sections need outer_fibre",
            "Pa", _stress, "largest stress", runs=_ANY),
     Metric("safety_factor_min", "least strength over stress of any beam; materials need strength", "1",
-           _safety_factor, "least safety factor", runs=_ANY, judged=False),
+           _safety_factor, "least safety factor", runs=_ANY, ranked=False),
     Metric("section_moment_max", "largest magnitude of the bending moment in any beam", "N m",
            _section_moment, "largest bending moment", runs=_ANY),
     Metric("total_mass", "mass of all bodies", "kg",
-           _as_it_is(lambda x: np.sum([body.integrals.m for body in x.system.bodies]) - rotor_mass(x.system.described)),
+           _absolute(lambda x: np.sum([body.integrals.m for body in x.system.bodies]) - rotor_mass(x.system.described)),
            "mass", runs=_ANY),
     Metric("actuation_condition_max", "largest condition number of the actuation matrix", "1",
            _largest(lambda x: x.condition), "largest condition number", runs=(PATH,)),
     _of_the_solver("constraint_position_max", "largest constraint violation in position", "m"),
     _of_the_solver("energy_balance_max", "largest imbalance of energy and work", "J"),
     Metric(VALIDITY, "size of the neglected terms over its limit: the model holds up to 1; 0 where nothing bends", "1",
-           _as_it_is(lambda x: 0.0 if x.validity is None else x.validity.ratio), smooth=False, runs=_ANY),
+           _absolute(lambda x: 0.0 if x.validity is None else x.validity.ratio), smooth=False, runs=_ANY),
     _of_the_solver("steps", "accepted steps", whole=True),
     _of_the_solver("rejected", "rejected steps", whole=True),
     _of_the_solver("newton_iterations", "Newton iterations", whole=True),
     _of_statics("travel", "change of each named coordinate from the start to the last step, with its sign", "rad",
                 lambda x: x.travel[-1], each=COORDINATE),
     _of_statics("travel_max", "largest magnitude of each named coordinate's change in all steps", "rad",
-                lambda x: _peaks(x.travel), "largest travel", each=COORDINATE, judged=True),
+                lambda x: _peaks(x.travel), "largest travel", each=COORDINATE, ranked=True),
     _of_statics("effort", "force or torque at each named coordinate at the last step: given, or what holds or moves it",
                 "N m", lambda x: x.effort[-1], "force or torque", each=COORDINATE),
     _of_statics("effort_max", "largest magnitude of the force or torque at each named coordinate", "N m",
-                lambda x: _peaks(x.effort), "largest force or torque", each=COORDINATE, judged=True),
+                lambda x: _peaks(x.effort), "largest force or torque", each=COORDINATE, ranked=True),
     _of_statics("stiffness", "stiffness of each requested coordinate at the last step", "N m/rad",
                 lambda x: x.stiffness[-1], each=DIRECTION),
     _of_statics("stiffness_min", "least stiffness of each requested coordinate, of all steps", "N m/rad",
                 lambda x: np.min(x.stiffness, axis=0), "least stiffness", each=DIRECTION),
     _of_statics("compliance", "displacement by a unit force of each requested coordinate at the last step; infinite "
                 "past buckling", "rad/N/m",
-                lambda x: x.compliance[-1], each=DIRECTION, judged=True),
+                lambda x: x.compliance[-1], each=DIRECTION, ranked=True),
     _of_statics("compliance_max", "largest compliance of each requested coordinate, of all steps", "rad/N/m",
-                lambda x: np.max(x.compliance, axis=0), "largest compliance", each=DIRECTION, judged=True),
+                lambda x: np.max(x.compliance, axis=0), "largest compliance", each=DIRECTION, ranked=True),
     _of_statics("frequency", "lowest natural frequency at the last step, held and moved coordinates fixed", "Hz",
                 lambda x: x.frequency[-1], "lowest natural frequency at the last step"),
     _of_statics("frequency_free", "lowest natural frequency at the last step, moved coordinates released", "Hz",
@@ -411,7 +411,7 @@ _ALL = (
     _of_statics("limit_load", "load factor at the first limit point; NaN for none", "1",
                 lambda x: x.limit_load),
     _of_statics(UNSTABLE, "unstable equilibria among the steps", "1", lambda x: x.unstable_steps, whole=True,
-                judged=True),
+                ranked=True),
 )  # fmt: skip
 
 METRICS: Mapping[str, Metric] = _Metrics({metric.name: metric for metric in _ALL})

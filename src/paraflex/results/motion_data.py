@@ -17,7 +17,7 @@ from paraflex.integrators.methods import title_of
 from paraflex.motion import MotionRun
 from paraflex.results.acting import load_variables
 from paraflex.results.controllers import controller_figures, with_controllers
-from paraflex.results.doubts import keep_findings, verdict_of
+from paraflex.results.findings import keep_findings, verdict_of
 from paraflex.results.kinds import check_kind
 from paraflex.results.labelled import (
     Variables,
@@ -33,10 +33,10 @@ from paraflex.results.links import system_links
 from paraflex.results.loads import load_figures
 from paraflex.results.numbers import by_label, finite_or_none
 from paraflex.results.record import RUN_FIGURES
-from paraflex.results.reduced_runs import reduction_figures
+from paraflex.results.reduced_runs import reduced_run_figures
 from paraflex.results.sensors import sensor_figures
 from paraflex.results.validity import validity_summary, validity_variables
-from paraflex.validity import doubtful_numbers
+from paraflex.validity import implausible_numbers
 
 
 @checked_arguments()
@@ -103,7 +103,7 @@ def motion_dataset(
     if isinstance(run, ControlledMotion):
         out = with_controllers(out, [run.controllers], [motor.name for motor in mechanism.motors])
     beyond = [] if run.validity is None or run.validity.holds else [run.validity.finding()]
-    keep_findings(out, [*findings, *doubtful_numbers(mechanism), *beyond, *run.doubts])
+    keep_findings(out, [*findings, *implausible_numbers(mechanism), *beyond, *run.findings])
     return out
 
 
@@ -132,7 +132,7 @@ def motion_summary(data: xr.Dataset) -> dict[str, Any]:
         "verdict": verdict_of(data).to_dict(),
         "validity": validity_summary(data),
         **sensor_figures(data),
-        **reduction_figures(data),
+        **reduced_run_figures(data),
         **controller_figures(data),
         "singular_positions": json.loads(data.attrs["singular_positions"]),
         "final": {

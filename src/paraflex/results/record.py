@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, fields
 from typing import Any
 
-from paraflex.arguments import given_as
+from paraflex.arguments import named_in_errors
 from paraflex.arrays import Array
 from paraflex.control.loop.run_loop import ControllerRecord
 from paraflex.control.loop.runs import ControlledTracking
@@ -36,7 +36,7 @@ RUN_FIGURES = (
 BRAKE_ENERGY = "brake_energy"
 
 
-@given_as("a record", "what results.record makes of a run")
+@named_in_errors("a record", "what results.record makes of a run")
 @dataclass(frozen=True, kw_only=True)
 class Record(Links):
     """Run of a task, link by link.
@@ -60,7 +60,7 @@ class Record(Links):
         Values of the figures named in RUN_FIGURES.
     validity : Validity, optional
         Validity of the model in this run; None if not defined.
-    doubts : tuple of Finding
+    findings : tuple of Finding
         Findings on implausible results.
     controllers : tuple of ControllerRecord
         Records of the sampled controllers; empty without controllers.
@@ -76,7 +76,7 @@ class Record(Links):
     end_effector: PointMotion
     figures: Mapping[str, Any] = field(default_factory=dict)
     validity: Validity | None = None
-    doubts: tuple[Finding, ...] = ()
+    findings: tuple[Finding, ...] = ()
     controllers: tuple[ControllerRecord, ...] = ()
     options: IntegrationOptions | None = None
 
@@ -101,6 +101,6 @@ def record(run: TrackingRun) -> Record:
         end_effector=point_motion(task.system, effector.point, solution.q[:k], solution.v[:k], solution.a[:k]),
         figures={name: getattr(solution, name) for name in (*RUN_FIGURES, BRAKE_ENERGY)},
         validity=run.validity,
-        doubts=run.doubts,
+        findings=run.findings,
         controllers=run.controllers if isinstance(run, ControlledTracking) else (),
     )

@@ -10,13 +10,13 @@ import xarray as xr
 
 from paraflex.findings import Finding
 from paraflex.formatting import number, quantity
-from paraflex.results.doubts import MODE, keep_findings, verdict_of
+from paraflex.results.findings import MODE, keep_findings, verdict_of
 from paraflex.results.following import HEADLINE, ErrorSpan
 from paraflex.results.numbers import finite_or_none
 
 if TYPE_CHECKING:
     # The module imports the kernels, which are not needed to read results.
-    from paraflex.reduction import Size
+    from paraflex.reduced_bodies import Size
 
 # Variable that identifies such a dataset, and prefix of the numbers of the full runs.
 DISTANCE, FULL = "reduction_distance", "full_"
@@ -28,7 +28,7 @@ _NUMBERS = (*HEADLINE.values(), "wall_time", "steps")
 _FAR = 0.1
 
 
-def beside_full(data: xr.Dataset, full: xr.Dataset, kept: Size, whole: Size) -> xr.Dataset:
+def compared_with_full(data: xr.Dataset, full: xr.Dataset, kept: Size, whole: Size) -> xr.Dataset:
     """Return the dataset of reduced runs with numbers of the full runs, distances to them, and findings on large ones.
 
     Parameters
@@ -54,11 +54,11 @@ def beside_full(data: xr.Dataset, full: xr.Dataset, kept: Size, whole: Size) -> 
             added[f"{FULL}{name}"] = number.assign_attrs(data[name].attrs | {"long_name": meaning})
     out = data.assign(added)
     out.attrs |= kept._asdict() | {f"{FULL}{name}": count for name, count in whole._asdict().items()}
-    keep_findings(out, [*verdict_of(data), *_far(out, full)])
+    keep_findings(out, [*verdict_of(data), *_distant_runs(out, full)])
     return out
 
 
-def _far(data: xr.Dataset, full: xr.Dataset) -> Iterator[Finding]:
+def _distant_runs(data: xr.Dataset, full: xr.Dataset) -> Iterator[Finding]:
     """Yield findings on runs that are far from the full ones."""
     along = "mode" in data.dims
     name = HEADLINE[ErrorSpan(data.attrs["error"])] if along else ""
@@ -76,7 +76,7 @@ def _far(data: xr.Dataset, full: xr.Dataset) -> Iterator[Finding]:
             )  # fmt: skip
 
 
-def reduction_figures(data: xr.Dataset) -> dict[str, Any]:
+def reduced_run_figures(data: xr.Dataset) -> dict[str, Any]:
     """Return `reduction` of the single run of a dataset, with its distance to the full run and numbers of the latter.
 
     The dictionary is empty if the run has all flexible coordinates.

@@ -66,15 +66,17 @@ def along_variables(
     paths = [_Path(one, states, method, until) for one in along]
     own = _errors(paths, lambda path, _: path.own, True)
     nothing = _Errors(*(np.full_like(part, np.nan) for part in own))
-    found, wanted = {OWN: [own, own]}, set(STATIC)
+    found, remaining = {OWN: [own, own]}, set(STATIC)
     # The path is closed if the last pose equals the first.
     first, last = (along[0].models[k].minimal for k in (0, -1))
     closed = bool(np.max(np.abs(last.point.q - first.point.q) / first.system.units) < _SAME)
     for name, take in _bases(places, closed=closed):
-        found[name] = [_errors(paths, take, static == STATIC[0]) if static in wanted else nothing for static in STATIC]
+        found[name] = [
+            _errors(paths, take, static == STATIC[0]) if static in remaining else nothing for static in STATIC
+        ]
         enough = [static for static, each in zip(STATIC, found[name], strict=True) if np.max(each.response) <= error]
-        wanted -= set(enough)
-        if not wanted:
+        remaining -= set(enough)
+        if not remaining:
             break
     # From (basis, static, mode, place, ...) to (mode, static, basis, place, ...).
     response = np.array([[one.response for one in both] for both in found.values()]).swapaxes(0, 2)

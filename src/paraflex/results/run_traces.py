@@ -16,7 +16,7 @@ from paraflex.control.loop.runs import ControlledMotion, ControlledTracking
 from paraflex.dynamics import System, joint_coordinate
 from paraflex.dynamics.joint_loads import (
     LoadErrors,
-    Undetermined,
+    UndeterminedLoads,
     drive_torques,
     joint_parts,
     load_errors,
@@ -24,7 +24,7 @@ from paraflex.dynamics.joint_loads import (
     undetermined_loads,
 )
 from paraflex.dynamics.points import point_motion
-from paraflex.equilibria.given import Coordinate
+from paraflex.equilibria.conditions import Coordinate
 from paraflex.equilibria.result import Statics
 from paraflex.integrators import Solution
 from paraflex.motion import MotionRun
@@ -120,7 +120,7 @@ class SolutionTraces(Generic[R]):
         return self.run.controllers if isinstance(self.run, ControlledTracking | ControlledMotion) else ()
 
     @cached_property
-    def _undetermined(self) -> Undetermined:
+    def _undetermined(self) -> UndeterminedLoads:
         names = [joint.name for joint in self.system.described.joints]
         return undetermined_loads(self.system, names, self.solution.q.real, self.solution.acting)
 

@@ -12,8 +12,8 @@ import xarray as xr
 from paraflex.arguments import checked_arguments
 from paraflex.equilibria import Statics
 from paraflex.findings import Finding
-from paraflex.results.doubts import keep_findings, verdict_of
 from paraflex.results.drawing import system_drawing
+from paraflex.results.findings import keep_findings, verdict_of
 from paraflex.results.kinds import check_kind
 from paraflex.results.labelled import label, link_coordinates, link_variables, name_units, with_totals
 from paraflex.results.links import system_links
@@ -22,7 +22,7 @@ from paraflex.results.run_traces import StaticsTraces
 from paraflex.results.statics_steps import NAMED_UNITS
 from paraflex.results.storage import origin
 from paraflex.results.validity import validity_summary, validity_variables
-from paraflex.validity import doubtful_numbers
+from paraflex.validity import implausible_numbers
 
 # Number of frequencies kept for each step.
 _FREQUENCIES = 8
@@ -108,7 +108,7 @@ def statics_dataset(
             out[name].attrs["comment"] = _COMMENTS[name]
     out.attrs = {"kind": "statics", "mechanism": mechanism.name, **origin(parameters)}
     beyond = [] if found.validity is None or found.validity.holds else [found.validity.finding()]
-    keep_findings(out, [*findings, *doubtful_numbers(mechanism), *beyond, *found.doubts])
+    keep_findings(out, [*findings, *implausible_numbers(mechanism), *beyond, *found.findings])
     return out
 
 
@@ -116,8 +116,8 @@ def _of_steps(found: Statics) -> dict[str, Any]:
     """Return the variables that only equilibria have."""
     traces, along = StaticsTraces(found), (("step", "named"),)
     stiffness, compliance = np.full((2, *traces.travel.shape), np.nan)
-    asked = [found.coordinates.index(one) for one in found.directions]
-    stiffness[:, asked], compliance[:, asked] = traces.stiffness, traces.compliance
+    measured = [found.coordinates.index(one) for one in found.directions]
+    stiffness[:, measured], compliance[:, measured] = traces.stiffness, traces.compliance
     return {
         "fraction": ("step", found.fraction),
         "limit_point": ("step", found.limit),
@@ -146,7 +146,7 @@ def _hertz(frequencies: np.ndarray, found: Statics) -> np.ndarray:
 
 def _given_travel(found: Statics) -> dict[str, Any]:
     """Return the travel of the first coordinate that is moved or loaded, the abscissa of figures."""
-    given = found.equations.given
+    given = found.equations.conditions
     for one in (*given.moved, *given.loads):
         attrs = {"long_name": f"travel of {one.name}", "units": one.unit, "coordinate": one.name}
         return {"given_travel": ("step", found.travel(one.name), attrs)}
@@ -159,7 +159,7 @@ def _buckling_shapes(found: Statics) -> dict[str, Any]:
     steps, count, n = shapes.shape
     moved = np.repeat(found.q, count, axis=0) + _SMALL * shapes.reshape(-1, n)
     known = np.isfinite(moved).all(axis=1)
-    if not known.any() or not found.equations.given.loads:
+    if not known.any() or not found.equations.conditions.loads:
         return {}
     drawn = system_drawing(found.system, found.q).shape
     out = np.full((steps * count, *drawn.shape[1:]), np.nan)
@@ -184,7 +184,7 @@ def _motors(found: Statics) -> dict[str, Any]:
 
 
 def _names(found: Statics) -> dict[str, Any]:
-    given, coordinates = found.equations.given, found.coordinates
+    given, coordinates = found.equations.conditions, found.coordinates
     roles = {one: role for role, ones in (("held", given.held), ("loaded", given.loads), ("moved", given.moved))
              for one in ones}  # fmt: skip
     return {

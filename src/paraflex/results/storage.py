@@ -39,8 +39,8 @@ _AGAIN = "copy it again, or delete it and run the same command again"
 
 def origin(parameters: Mapping[str, Any] | None) -> dict[str, Any]:
     """Return the provenance attributes of a dataset: requested parameters, version of paraflex, schema."""
-    asked = json.dumps(parameters or {}, sort_keys=True)
-    return {"parameters": asked, "paraflex_version": version("paraflex"), "schema": SCHEMA}
+    text = json.dumps(parameters or {}, sort_keys=True)
+    return {"parameters": text, "paraflex_version": version("paraflex"), "schema": SCHEMA}
 
 
 @checked_arguments()

@@ -9,13 +9,13 @@ import xarray as xr
 
 from paraflex.arguments import checked_arguments
 from paraflex.results.controllers import controller_figures
-from paraflex.results.doubts import verdict_of
+from paraflex.results.findings import verdict_of
 from paraflex.results.following import FOLLOWING, ErrorSpan, part_run
 from paraflex.results.kinds import check_kind
 from paraflex.results.loads import load_figures
 from paraflex.results.metrics import METRICS
 from paraflex.results.numbers import by_label, finite_or_none
-from paraflex.results.reduced_runs import reduction_figures
+from paraflex.results.reduced_runs import reduced_run_figures
 from paraflex.results.sensors import sensor_figures
 from paraflex.results.traces import data_traces
 from paraflex.results.validity import validity_summary
@@ -48,7 +48,7 @@ def summary(data: xr.Dataset, failed: dict[str, str] | None = None) -> dict[str,
         `modes.<mode>` with tracking errors during the motion, after it and over the whole run, vibration and drift,
         peak_torque and rms_torque per motor, end_effector_final, the solver's figures, validity (None for rigid bodies)
         and `loads` (see `loads.load_figures`); also `sensors` if the mechanism has sensors (see
-        `sensors.sensor_figures`), `reduction` if its bodies are reduced (see `reduced_runs.reduction_figures`), and
+        `sensors.sensor_figures`), `reduction` if its bodies are reduced (see `reduced_runs.reduced_run_figures`), and
         `controllers` and internal_torque_max [N m] with controllers (see `controllers.controller_figures`).
         `tolerance` [m] of the integration; `error`, the time span of the error that ranks the modes; `verdict`, with
         level and all findings; `after`, the state of the motors after the path; `part`, the part of the path covered by
@@ -80,7 +80,7 @@ def summary(data: xr.Dataset, failed: dict[str, str] | None = None) -> dict[str,
         numbers["actuation_condition_max"] = finite_or_none(METRICS["actuation_condition_max"].value(traces))
         numbers["validity"] = validity_summary(run)
         numbers["loads"] = load_figures(run)
-        numbers |= sensor_figures(run) | reduction_figures(run) | controller_figures(run)
+        numbers |= sensor_figures(run) | reduced_run_figures(run) | controller_figures(run)
         modes[str(name)] = numbers
     for name, reason in (failed or {}).items():
         modes[name] = {"status": "failed", "message": reason}

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from paraflex.arguments import checked_arguments, given_as
+from paraflex.arguments import checked_arguments, named_in_errors
 from paraflex.arrays import Array
 from paraflex.campaign import Result
 from paraflex.errors import as_enum
@@ -24,7 +24,7 @@ from paraflex.results.metrics import METRICS
 from paraflex.results.record import Record
 from paraflex.results.traces import Traces
 from paraflex.tracking import TrackingTask
-from paraflex.validity import doubtful_numbers
+from paraflex.validity import implausible_numbers
 
 
 class Refinement(Enum):
@@ -61,7 +61,7 @@ class ModelRuns:
         return self.finished(Refinement.NONE)
 
 
-@given_as("a verification", "what verify returns")
+@named_in_errors("a verification", "what verify returns")
 @dataclass(frozen=True)
 class Verification(Result):
     """Runs of all models in all modes.
@@ -132,7 +132,7 @@ class Verification(Result):
         """Return errors and distances of the models as plain values; None where a run did not reach its end."""
         task, reference = self.task, reference_model(self.models)
         part = part_of(task.path, float(task.motion.t[-1]))
-        findings = [*doubtful_numbers(task.mechanism), *([] if part is None else [part.finding()])]
+        findings = [*implausible_numbers(task.mechanism), *([] if part is None else [part.finding()])]
         out = {
             "mechanism": task.mechanism.name,
             "duration": float(task.motion.t[-1]),

@@ -8,7 +8,7 @@ from functools import partial
 
 import numpy as np
 
-from paraflex.arguments import checked_arguments, given_as
+from paraflex.arguments import checked_arguments, named_in_errors
 from paraflex.arrays import Array
 from paraflex.dynamics import State, System, build_system
 from paraflex.dynamics.points import point_motion
@@ -22,7 +22,7 @@ from paraflex.tracking import TrackingRun, TrackingTask, simulate
 Progress = Callable[[float], None]
 
 
-@given_as("a case", "what tracking_case or motion_case returns")
+@named_in_errors("a case", "what tracking_case or motion_case returns")
 @dataclass(frozen=True)
 class Case:
     """A motion to be integrated by several methods.

@@ -110,7 +110,7 @@ class ComparisonStudy(WholeStudy[MethodComparison], CheckedFields):
     options: ComparisonOptions | None = None
     parameters: dict[str, Any] | None = None
 
-    def _ready(self, workers: Workers | None) -> Callable[[OnProgress | None], MethodComparison]:
+    def _prepare(self, workers: Workers | None) -> Callable[[OnProgress | None], MethodComparison]:
         no_workers(workers, "runs are made one after another")
         return self._run
 
@@ -122,15 +122,15 @@ class ComparisonStudy(WholeStudy[MethodComparison], CheckedFields):
         found: list[Measurement] = []
         reference, interrupted = None, False
 
-        def tell(what: str) -> None:
+        def report(what: str) -> None:
             if on_progress is not None:
                 on_progress(Progress(len(found), total, len(found), doing=what))
 
         try:
-            tell("reference")
+            report("reference")
             reference, places = _reference(case, options)
             for method in chosen:
-                for measurement in _measurements(case, method, plans[method.name], places, options, tell):
+                for measurement in _measurements(case, method, plans[method.name], places, options, report):
                     found.append(measurement)
         except KeyboardInterrupt:
             interrupted = True
@@ -213,7 +213,7 @@ def _measurements(
     plan: Sequence[_Setting],
     places: Array,
     options: ComparisonOptions,
-    tell: Callable[[str], None],
+    report: Callable[[str], None],
 ) -> Iterator[Measurement]:
     slow: dict[bool, str] = {}
     for number, setting in enumerate(plan):
@@ -221,7 +221,7 @@ def _measurements(
         if by_step in slow:
             yield setting.row(method.name, "skipped", f"too slow at {slow[by_step]} already")
             continue
-        tell(f"{method.title}, {setting}")
+        report(f"{method.title}, {setting}")
         try:
             if number == 0:
                 _warm_up(case, setting.options(method.name))
@@ -301,18 +301,20 @@ def _reference(case: Case, options: ComparisonOptions) -> tuple[Reference, Array
     reasons = []
     # If only one method succeeds, it is compared with itself at another tolerance.
     for method, times in [(x, y) for y in (1.0, 4.0) for x in ours]:
-        asked = tolerance * (2.0 if runs and times == 1.0 else times)
+        finer = tolerance * (2.0 if runs and times == 1.0 else times)
         try:
             solved = _solve(
-                case, IntegrationOptions(method=method.name, tolerance=asked), _REFERENCE_PATIENCE * options.limit
+                case,
+                IntegrationOptions(method=method.name, tolerance=finer),
+                _REFERENCE_PATIENCE * options.limit,
             )
         except _TooSlowError:
-            reasons.append(f"{method.title} takes longer than {_REFERENCE_PATIENCE * options.limit:g} s at {asked:g} m")
+            reasons.append(f"{method.title} takes longer than {_REFERENCE_PATIENCE * options.limit:g} s at {finer:g} m")
             continue
         except NumericalError as error:
-            reasons.append(f"{method.title} at {asked:g} m: {error}")
+            reasons.append(f"{method.title} at {finer:g} m: {error}")
             continue
-        runs.append((method, asked, solved))
+        runs.append((method, finer, solved))
         if len(runs) == 2:
             break
     if len(runs) < 2:

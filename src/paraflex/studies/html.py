@@ -7,14 +7,14 @@ from typing import Any
 from paraflex.designs.sweep import SweepResult
 from paraflex.display import described, facts, page, sentence, table
 from paraflex.figures import search, sensitivity
-from paraflex.figures.laws import law_table
+from paraflex.figures.laws import profile_table
 from paraflex.figures.methods import tables
 from paraflex.figures.search import IDENTIFICATION
 from paraflex.figures.verification import model_table, path_extent
 from paraflex.formatting import number, quantity
 from paraflex.late import view
 from paraflex.results import summary
-from paraflex.results.doubts import doubt_lines, verdict_of
+from paraflex.results.findings import finding_lines, verdict_of
 from paraflex.results.following import HEADLINE, SPAN_WORDS, ErrorSpan
 from paraflex.results.validity import validity_line
 from paraflex.studies.agreement import Verification
@@ -59,7 +59,7 @@ def study_html(result: StudyResult) -> str:
     title += ", interrupted" if result.interrupted else ""
     holds = validity_line({name: mode.get("validity") for name, mode in found["modes"].items()})
     why += [sentence(holds)] if holds else []
-    return page(title, *map(sentence, doubt_lines(verdict_of(result.data))), table(heads, rows), *why)
+    return page(title, *map(sentence, finding_lines(verdict_of(result.data))), table(heads, rows), *why)
 
 
 @view.register(SweepResult)
@@ -139,7 +139,9 @@ def laws_html(comparison: LawComparison) -> str:
     why = [sentence(f"{law} in {mode}: {cell['reason']}") for law, one in found["laws"].items()
            for mode, cell in one["modes"].items() if "reason" in cell]  # fmt: skip
     state = _state(comparison.complete, comparison.interrupted)
-    return page(f"{found['mechanism']}, control laws compared: {state}", described(law_table(comparison.data)), *why)
+    return page(
+        f"{found['mechanism']}, control laws compared: {state}", described(profile_table(comparison.data)), *why
+    )
 
 
 def _search_facts(result: SearchResult) -> list[tuple[str, Any]]:

@@ -21,7 +21,7 @@ from paraflex.errors import InputError
 from paraflex.files import Model, load
 from paraflex.integrators import IntegrationOptions
 from paraflex.mechanism import ActuationMode
-from paraflex.reduction import reduced_mechanism
+from paraflex.reduced_bodies import reduced_mechanism
 from paraflex.results.following import HEADLINE, ErrorSpan
 from paraflex.results.labelled import provenance
 from paraflex.results.metrics import METRICS
@@ -32,7 +32,7 @@ from paraflex.tracking import TrackingTask
 _AND = "+"
 # Default metrics: RMS and largest tracking error of the span come first, then these.
 _LARGEST = {ErrorSpan.MOTION: "tracking_max_motion", ErrorSpan.WHOLE: "tracking_max"}
-_JUDGED = (
+_DEFAULT_METRICS = (
     "residual_vibration", "settling_time", "overshoot", "peak_torque_max", "internal_torque_max", "motor_energy",
     "saturated_share",
 )  # fmt: skip
@@ -91,7 +91,7 @@ class LawStudy(WholeStudy[LawComparison], CheckedFields):
             if not isinstance(together, list | tuple) or not all(isinstance(one, kinds) for one in together):
                 remedy = "give those of a model, or pf.SampledController(law, name=...)"
                 raise refused(together, f"laws.{law}", "a list of controllers", remedy)
-        names = self.metrics or (HEADLINE[self.error], _LARGEST[self.error], *_JUDGED)
+        names = self.metrics or (HEADLINE[self.error], _LARGEST[self.error], *_DEFAULT_METRICS)
         object.__setattr__(self, "metrics", metrics_of(names, self.error, self._task.mechanism))
 
     @property
@@ -105,7 +105,7 @@ class LawStudy(WholeStudy[LawComparison], CheckedFields):
             law if len(self.tasks) == 1 else f"{law}, {path}": (law, path) for law in self.laws for path in self.tasks
         }
 
-    def _ready(self, workers: Workers | None) -> Callable[[OnProgress | None], LawComparison]:
+    def _prepare(self, workers: Workers | None) -> Callable[[OnProgress | None], LawComparison]:
         workers = workers or Workers()
         if workers.engine != THREADS:
             raise InputError("laws run in threads", field="workers", value=workers.engine, remedy="leave it out")
@@ -117,18 +117,18 @@ class LawStudy(WholeStudy[LawComparison], CheckedFields):
         found: dict[Cell, Row] = {}
         began = time.perf_counter()
 
-        def tell() -> None:
+        def report() -> None:
             if on_progress is not None:
                 on_progress(Progress(len(found), len(cells), len(found), time.perf_counter() - began))
 
         # Results of interrupted runs are discarded, because they do not characterise a law.
         with suppress(KeyboardInterrupt):
-            tell()
+            report()
             with workers.open() as engine:
                 for cell, row in outcomes(engine, self._cell, cells):
                     assert not isinstance(row, LostWorker)  # only processes can be lost
                     found[cell] = row
-                    tell()
+                    report()
         return LawComparison(self._dataset(modes, found), interrupted=len(found) < len(cells))
 
     def _cell(self, cell: Cell, watch: Any) -> Row:
@@ -168,8 +168,8 @@ def laws_of(model: Model, names: Sequence[str] = ()) -> dict[str, tuple[Controll
         whole torque.
     """
     together = [_AND.join(model.study.controllers)] if len(model.study.controllers) > 1 else []
-    wanted = [name for name in names or [*model.controllers, *together] if name != NONE]
-    acting = {name: [name] if name in model.controllers else name.split(_AND) for name in wanted}
+    chosen = [name for name in names or [*model.controllers, *together] if name != NONE]
+    acting = {name: [name] if name in model.controllers else name.split(_AND) for name in chosen}
     for name, parts in acting.items():
         if NONE in parts or "" in parts:
             raise InputError("names no controllers", field="controllers", value=name,

@@ -22,10 +22,10 @@ from paraflex.folders import RUN
 from paraflex.integrators import IntegrationOptions
 from paraflex.interrupts import Calls
 from paraflex.mechanism import ActuationMode
-from paraflex.reduction import size_of
+from paraflex.reduced_bodies import size_of
 from paraflex.results import summary, tracking_dataset
 from paraflex.results.following import ErrorSpan
-from paraflex.results.reduced_runs import beside_full
+from paraflex.results.reduced_runs import compared_with_full
 from paraflex.tracking import TrackingRun, TrackingTask, simulate
 
 
@@ -133,7 +133,7 @@ class TrackingStudy(WholeStudy[StudyResult], CheckedFields):
     full: TrackingTask | None = None
     controllers: Sequence[ControllerDescription] = ()
 
-    def _ready(self, workers: Workers | None) -> Callable[[OnProgress | None], StudyResult]:
+    def _prepare(self, workers: Workers | None) -> Callable[[OnProgress | None], StudyResult]:
         if self.method is not None and not callable(self.method):
             remedy = "name it in options=IntegrationOptions(method=...); a function runs modes in its own way"
             raise refused(self.method, "method", "a function", remedy)
@@ -155,10 +155,10 @@ class TrackingStudy(WholeStudy[StudyResult], CheckedFields):
             calls = Calls()
             try:
                 for mode in chosen:
-                    futures[mode.name] = calls.hand(pool.submit, self._mode, self.task, mode, stop, on_progress)
+                    futures[mode.name] = calls.submit(pool.submit, self._mode, self.task, mode, stop, on_progress)
                 if self.full is not None:
                     for mode in chosen:
-                        whole[mode.name] = calls.hand(pool.submit, self._mode, self.full, mode, stop, None)
+                        whole[mode.name] = calls.submit(pool.submit, self._mode, self.full, mode, stop, None)
                 left = {*futures.values(), *whole.values()}
                 while left:
                     left -= calls.done()
@@ -214,7 +214,7 @@ class TrackingStudy(WholeStudy[StudyResult], CheckedFields):
             )
         if data is not None and self.full is not None and whole:
             sizes = [size_of(task.system, task.start) for task in (self.task, self.full)]
-            data = beside_full(data, tracking_dataset(whole, options=self.options), *sizes)
+            data = compared_with_full(data, tracking_dataset(whole, options=self.options), *sizes)
         return StudyResult(data, failed, interrupted)
 
 

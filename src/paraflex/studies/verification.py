@@ -94,7 +94,7 @@ class VerificationStudy(WholeStudy[Verification], CheckedFields):
     parameters: dict[str, Any] | None = None
     error: ErrorSpan | str = ErrorSpan.MOTION
 
-    def _ready(self, workers: Workers | None) -> Callable[[OnProgress | None], Verification]:
+    def _prepare(self, workers: Workers | None) -> Callable[[OnProgress | None], Verification]:
         no_workers(workers, "runs are made one after another")
         models = tuple(dict.fromkeys(self.models))
         for name in models:

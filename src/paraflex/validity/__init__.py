@@ -13,7 +13,7 @@ from paraflex.errors import ValidityWarning
 from paraflex.findings import Finding, warn_of
 from paraflex.integrators import Solution
 from paraflex.validity.bending import bending_of
-from paraflex.validity.blame import to_blame as to_blame, with_blame as with_blame
+from paraflex.validity.causes import likely_cause as likely_cause, with_likely_cause as with_likely_cause
 from paraflex.validity.indicators import (
     AXIAL_LIMIT as AXIAL_LIMIT,
     DRIVEN_AXIAL_LIMIT as DRIVEN_AXIAL_LIMIT,
@@ -26,12 +26,12 @@ from paraflex.validity.indicators import (
     of_linear,
     of_second_order,
 )
-from paraflex.validity.numbers import doubtful_numbers as doubtful_numbers, mechanism_size as mechanism_size
+from paraflex.validity.numbers import implausible_numbers as implausible_numbers, mechanism_size as mechanism_size
 from paraflex.validity.plausibility import (
     Driven as Driven,
-    doubtful_results as doubtful_results,
-    doubtful_stresses as doubtful_stresses,
-    moved_far as moved_far,
+    implausible_results as implausible_results,
+    implausible_stresses as implausible_stresses,
+    large_rotations as large_rotations,
     shared_loads as shared_loads,
     stiff_modes as stiff_modes,
     unresolved_loads as unresolved_loads,

@@ -28,7 +28,7 @@ LONG = 5.0
 _G = 9.81
 
 
-def doubtful_actions(mechanism: Mechanism, size: float, mass: float, times: Array) -> Iterator[Finding]:
+def implausible_actions(mechanism: Mechanism, size: float, mass: float, times: Array) -> Iterator[Finding]:
     """Yield findings about joints, springs, friction, damping and loads, from the description alone.
 
     Parameters
@@ -42,17 +42,17 @@ def doubtful_actions(mechanism: Mechanism, size: float, mass: float, times: Arra
     times : (k,) array
         Times at which loads in time are evaluated [s].
     """
-    yield from _twice(mechanism)
+    yield from _duplicates(mechanism)
     yield from _beside(mechanism)
     yield from _springs(mechanism, size)
     yield from _damped(mechanism)
-    yield from _sharp(mechanism)
+    yield from _sharp_friction(mechanism)
     if mass > 0.0 and size > 0.0:
-        yield from _rubbing(mechanism, size, mass * _G)
+        yield from _excessive_friction(mechanism, size, mass * _G)
         yield from _loaded(mechanism, size, mass * _G, times)
 
 
-def _twice(mechanism: Mechanism) -> Iterator[Finding]:
+def _duplicates(mechanism: Mechanism) -> Iterator[Finding]:
     first: dict[frozenset[PointRef], str] = {}
     for joint in mechanism.joints:
         held = frozenset((joint.a, joint.b))
@@ -137,7 +137,7 @@ def _damping_ratio(body: Body) -> tuple[float, str]:
     return 0.0, ""
 
 
-def _sharp(mechanism: Mechanism) -> Iterator[Finding]:
+def _sharp_friction(mechanism: Mechanism) -> Iterator[Finding]:
     for one in mechanism.frictions:
         if 0.0 < one.speed < SHARP:
             unit = "m/s" if mechanism.slides(one.joint) else "rad/s"
@@ -148,7 +148,7 @@ def _sharp(mechanism: Mechanism) -> Iterator[Finding]:
             )  # fmt: skip
 
 
-def _rubbing(mechanism: Mechanism, size: float, weight: float) -> Iterator[Finding]:
+def _excessive_friction(mechanism: Mechanism, size: float, weight: float) -> Iterator[Finding]:
     for one in mechanism.frictions:
         slides = mechanism.slides(one.joint)
         bound, unit = (RUBBING_SLIDE * weight, "N") if slides else (RUBBING_TURN * weight * size, "N m")
@@ -168,12 +168,12 @@ def _loaded(mechanism: Mechanism, size: float, weight: float, times: Array) -> I
         try:
             largest = load.largest(times)
         except InputError:
-            # A prescribed law may be undefined beyond an earlier end of the run; otherwise the run reports the error.
+            # The profile may be undefined beyond an earlier end of the run; otherwise the run reports the error.
             continue
         if largest > (most if force else most * size):
             yield Finding(
                 "load-large", f"load.{load.name}.{load.kind}",
-                f"{'up to ' if load.laws else ''}{largest:.3g} {load.unit}, where all bodies weigh {weight:.3g} N"
+                f"{'up to ' if load.profiles else ''}{largest:.3g} {load.unit}, where all bodies weigh {weight:.3g} N"
                 + ("" if force else f", in a mechanism of {size:.3g} m"),
                 f"it is in {load.unit}: is it in another unit, or are masses?",
             )  # fmt: skip

@@ -18,7 +18,7 @@ from paraflex.mechanism import AssumedModesBeam, FlexibleBeam, Mechanism, ModalB
 from paraflex.mechanism.bodies import Body, Material
 from paraflex.mechanism.poses import local_points
 from paraflex.mechanism.tracks import longest_element, too_long, tracks
-from paraflex.validity.actions import doubtful_actions
+from paraflex.validity.actions import implausible_actions
 
 Place = tuple[float, float]
 Beam = FlexibleBeam | AssumedModesBeam
@@ -58,11 +58,11 @@ FAST = 300.0
 # Length of a beam beyond its last point relative to the whole.
 OVERHANG = 0.5
 _TURN = 2.0 * math.pi
-# Number of instants at which a law is evaluated.
+# Number of instants at which a profile is evaluated.
 _LOOKS = 201
 
 
-def doubtful_numbers(mechanism: Mechanism, duration: float | None = None) -> list[Finding]:
+def implausible_numbers(mechanism: Mechanism, duration: float | None = None) -> list[Finding]:
     """Return findings about a mechanism's own numbers, from its description alone.
 
     Parameters
@@ -70,7 +70,7 @@ def doubtful_numbers(mechanism: Mechanism, duration: float | None = None) -> lis
     mechanism : Mechanism
         Mechanism as described.
     duration : float, optional
-        Time up to which laws in time are evaluated [s]; at the start alone by default.
+        Time up to which profiles in time are evaluated [s]; at the start alone by default.
 
     Returns
     -------
@@ -80,14 +80,14 @@ def doubtful_numbers(mechanism: Mechanism, duration: float | None = None) -> lis
     size = mechanism_size(mechanism)
     found = [*_lengths(mechanism, size), *_gravity(mechanism.gravity), *_angles(mechanism), *_drives(mechanism)]
     times = np.linspace(0.0, duration or 0.0, _LOOKS)
-    found += _laws(mechanism, size, times)
+    found += _profiles(mechanism, size, times)
     for body in mechanism.bodies:
         if isinstance(body, Beam):
             found += _beam(body, size)
         elif isinstance(body, RigidBody):
             found += _rigid(body, size)
     found += [*_masses(mechanism, size), *_hinges(mechanism), *_one_place(mechanism, size), *_meshes(mechanism)]
-    return _shared([*found, *doubtful_actions(mechanism, size, mechanism_mass(mechanism), times)])
+    return _shared([*found, *implausible_actions(mechanism, size, mechanism_mass(mechanism), times)])
 
 
 def _meshes(mechanism: Mechanism) -> Iterator[Finding]:
@@ -198,15 +198,15 @@ def _angles(mechanism: Mechanism) -> Iterator[Finding]:
             )  # fmt: skip
 
 
-def _laws(mechanism: Mechanism, size: float, times: Array) -> Iterator[Finding]:
-    """Yield laws likely in degrees, which start beyond one turn or swing over two, and large speeds."""
+def _profiles(mechanism: Mechanism, size: float, times: Array) -> Iterator[Finding]:
+    """Yield profiles likely in degrees, which start beyond one turn or swing over two, and large speeds."""
     for one in mechanism.prescribed:
         if mechanism.slides(one.joint):
             continue
         try:
-            angle, rate, _ = one.law.evaluate(times)
+            angle, rate, _ = one.profile.evaluate(times)
         except InputError:
-            # A law may be undefined beyond an earlier end of the run; otherwise the run reports the error.
+            # A profile may be undefined beyond an earlier end of the run; otherwise the run reports the error.
             continue
         place = f"prescribed.{one.name}"
         swing = float(np.ptp(angle)) if np.any(rate > 0.0) and np.any(rate < 0.0) else 0.0

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 
 from paraflex.arrays import Array
-from paraflex.dynamics import System, joint_coordinate, missed_turns
+from paraflex.dynamics import System, joint_coordinate, missing_rotations
 from paraflex.dynamics.joint_loads import drive_torques, load_errors, undetermined_loads
 from paraflex.dynamics.rank import joint_of_row
 from paraflex.dynamics.sections import sections_of
@@ -23,8 +23,8 @@ from paraflex.kernel.packed import CONSTRAINT
 from paraflex.mechanism import Assembly, Mechanism, PointForce, approximate_poses, grouped
 from paraflex.units import STRESS
 from paraflex.validity.bending import bending_of
-from paraflex.validity.blame import most_likely
-from paraflex.validity.numbers import FAST, STANDARD_GRAVITY, doubtful_numbers, mechanism_size
+from paraflex.validity.causes import cause_among
+from paraflex.validity.numbers import FAST, STANDARD_GRAVITY, implausible_numbers, mechanism_size
 
 # Energy error relative to the largest energy: the library's runs have up to 3e-4 with the default tolerance. Energies
 # below the second fraction of weight times size count as zero.
@@ -42,7 +42,7 @@ TORQUE = 30.0
 # Force of a joint or drive, torques divided by the size, relative to the same; wide enough for the slowest mechanisms.
 FORCE = 1000.0
 # Fraction of the samples in which a force is at least as large, to exclude poles at singular configurations.
-_LASTING = 0.1
+_PEAK_SHARE = 0.1
 # Rotation of a body while loops are closed above which another angle or elbow was likely intended [rad].
 _FAR = 0.5
 # Condition number of the actuation matrix that explains large torques.
@@ -83,20 +83,20 @@ class Driven:
         return float(np.sqrt(np.mean(np.sum((self.actual - self.desired) ** 2, axis=1))))
 
 
-class _Where(NamedTuple):
+class _Context(NamedTuple):
     """Place of the findings of a run, and the mechanism whose numbers may have caused them."""
 
     place: str
     mechanism: Mechanism
 
-    def blame(self, *bodies: str) -> str:
+    def likely_cause(self, *bodies: str) -> str:
         """Return the number of the model that is the most likely cause, named bodies first; empty for none."""
-        return most_likely(doubtful_numbers(self.mechanism), bodies)
+        return cause_among(implausible_numbers(self.mechanism), bodies)
 
 
 def stiff_modes(system: System) -> Iterator[Finding]:
     """Yield bodies whose kept modes cannot represent the moments at their joints and loads."""
-    for one in missed_turns(system):
+    for one in missing_rotations(system):
         yield Finding(
             "modes-too-stiff", f"body.{one.point.body}.modes",
             f"{one.modes} modes miss {100.0 * one.part:.0f} % of its rotation under a moment at {one.point.point} from "
@@ -105,7 +105,7 @@ def stiff_modes(system: System) -> Iterator[Finding]:
         )  # fmt: skip
 
 
-def doubtful_results(
+def implausible_results(
     system: System, solution: Solution, driven: Driven | None = None, mechanism: Mechanism | None = None
 ) -> list[Finding]:
     """Return findings about implausible results of a run.
@@ -129,7 +129,7 @@ def doubtful_results(
     if not solution.t.size:
         return []
     mechanism = mechanism or system.described
-    where = _Where("" if driven is None else f"mode {driven.mode}", mechanism)
+    where = _Context("" if driven is None else f"mode {driven.mode}", mechanism)
     undamped = any(body.damping.size > 0 and not body.damping.any() for body in system.bodies)
     found = [
         *stiff_modes(system),
@@ -138,18 +138,18 @@ def doubtful_results(
         *_unbalanced(where, system, solution),
         # No default method resolves axial vibrations of undamped beams: tables give the errors with the values.
         *(_begun_singular(solution, where.place) if undamped else unresolved_loads(system, solution, where.place)),
-        *_fast(where, system, solution),
+        *_excessive_speeds(where, system, solution),
         *_large_forces(where, system, solution),
         *shared_loads(system, solution),
     ]
     if driven is not None:
-        found += [*_lost(where, driven), *_large_torques(where, system, driven, solution.t)]
+        found += [*_lost_control(where, driven), *_large_torques(where, system, driven, solution.t)]
     return found
 
 
-def doubtful_stresses(system: System, solution: Solution) -> list[Finding]:
+def implausible_stresses(system: System, solution: Solution) -> list[Finding]:
     """Return findings about the stresses of equilibria or a run."""
-    return list(_overstressed(_Where("", system.described), system, solution))
+    return list(_overstressed(_Context("", system.described), system, solution))
 
 
 def shared_loads(system: System, solution: Solution) -> Iterator[Finding]:
@@ -157,12 +157,12 @@ def shared_loads(system: System, solution: Solution) -> Iterator[Finding]:
     names = [joint.name for joint in system.described.joints]
     found = undetermined_loads(system, names, solution.q, solution.acting)
     # Loads have poles at singular configurations.
-    lasting = np.isfinite(solution.multipliers).any(axis=1)
+    regular = np.isfinite(solution.multipliers).any(axis=1)
     drives = [f"prescribed.{one.name}" for one in system.described.prescribed]
     forces, moments, drives_too = (
-        np.any(found.force[lasting], axis=(0, 2)),
-        np.any(found.moment[lasting], axis=0),
-        np.any(found.drive[lasting], axis=0),
+        np.any(found.force[regular], axis=(0, 2)),
+        np.any(found.moment[regular], axis=0),
+        np.any(found.drive[regular], axis=0),
     )
     kinds = ("forces in", names, forces), ("moments in", names, moments), ("torques or forces of", drives, drives_too)
     named = [(kind, ", ".join(itertools.compress(whose, at))) for kind, whose, at in kinds]
@@ -176,12 +176,12 @@ def shared_loads(system: System, solution: Solution) -> Iterator[Finding]:
         )  # fmt: skip
 
 
-def doubtful_torques(system: System, driven: Driven, t: Array) -> list[Finding]:
+def implausible_torques(system: System, driven: Driven, t: Array) -> list[Finding]:
     """Return findings about the torques and forces of a plan at times t (k,), before a run."""
-    return list(_large_torques(_Where(f"mode {driven.mode}", system.mechanism), system, driven, t))
+    return list(_large_torques(_Context(f"mode {driven.mode}", system.mechanism), system, driven, t))
 
 
-def _large_slopes(where: _Where, system: System, solution: Solution) -> Iterator[Finding]:
+def _large_slopes(where: _Context, system: System, solution: Solution) -> Iterator[Finding]:
     bendings = [bending_of(system, body.name, solution) for body in system.bodies if body.nf]
     slopes = {
         name: np.max([one.slope for one in bendings if one.name == name], axis=0)
@@ -192,7 +192,7 @@ def _large_slopes(where: _Where, system: System, solution: Solution) -> Iterator
     worst = max(slopes, key=lambda name: np.max(slopes[name]))
     k = int(np.argmax(slopes[worst]))
     if slopes[worst][k] > STEEP:
-        blame = where.blame(worst) or (
+        blame = where.likely_cause(worst) or (
             f"look at section and Young's modulus of {worst}, and at its motion and loads"
             + _moving(where.mechanism, solution)
         )
@@ -203,7 +203,7 @@ def _large_slopes(where: _Where, system: System, solution: Solution) -> Iterator
         )  # fmt: skip
 
 
-def _overstressed(where: _Where, system: System, solution: Solution) -> Iterator[Finding]:
+def _overstressed(where: _Context, system: System, solution: Solution) -> Iterator[Finding]:
     """Yield beams stressed beyond the strength of their material."""
     sections = sections_of(system)
     if sections is None or not np.isfinite(sections.strength).any():
@@ -219,14 +219,14 @@ def _overstressed(where: _Where, system: System, solution: Solution) -> Iterator
             f"a stress of {stress:.3g} {STRESS.name} in {name} at {start + loads.x[k, station]:.3g} m, "
             f"{solution.instant(int(k), 4)}: its material bears {strength:.3g} {STRESS.name}, the safety factor is "
             f"{1.0 / used[k, station]:.2g}",
-            where.blame(name) or (
+            where.likely_cause(name) or (
                 f"give {name} a stronger section or material, or move and load it less"
                 + _moving(where.mechanism, solution)
             ),
         )  # fmt: skip
 
 
-def _unbalanced(where: _Where, system: System, solution: Solution) -> Iterator[Finding]:
+def _unbalanced(where: _Context, system: System, solution: Solution) -> Iterator[Finding]:
     """Yield runs whose energy does not balance the work."""
     energy = np.abs(solution.kinetic_energy) + np.abs(solution.strain_energy)
     # Models without energies have NaN.
@@ -307,7 +307,7 @@ def _loads(system: System, multipliers: Array) -> dict[tuple[str, str], float]:
     return forces | moments | drives
 
 
-def _fast(where: _Where, system: System, solution: Solution) -> Iterator[Finding]:
+def _excessive_speeds(where: _Context, system: System, solution: Solution) -> Iterator[Finding]:
     speeds = np.stack([np.linalg.norm(solution.v[:, body.position], axis=1) for body in system.bodies], axis=1)
     k, b = np.unravel_index(np.argmax(np.where(np.isfinite(speeds), speeds, -1.0)), speeds.shape)
     if speeds[k, b] > FAST:
@@ -315,11 +315,11 @@ def _fast(where: _Where, system: System, solution: Solution) -> Iterator[Finding
         yield Finding(
             "speed-large", where.place,
             f"{name} moves at {speeds[k, b]:.3g} m/s at {solution.instant(int(k), 4)}",
-            where.blame() or "look at loads and torques (N, N m), prescribed motions (rad, s) and stiffnesses",
+            where.likely_cause() or "look at loads and torques (N, N m), prescribed motions (rad, s) and stiffnesses",
         )  # fmt: skip
 
 
-def _lost(where: _Where, driven: Driven) -> Iterator[Finding]:
+def _lost_control(where: _Context, driven: Driven) -> Iterator[Finding]:
     extent = float(np.linalg.norm(np.ptp(driven.desired, axis=0)))
     error = driven.deviation
     if error > LOST * extent > 0.0:
@@ -331,11 +331,11 @@ def _lost(where: _Where, driven: Driven) -> Iterator[Finding]:
         yield Finding(
             "error-large", where.place,
             f"the tracking error is {error:.3g} m on a path that is {extent:.3g} m large: it is not followed",
-            where.blame() or (f"{others}; {soft}" if others else soft),
+            where.likely_cause() or (f"{others}; {soft}" if others else soft),
         )  # fmt: skip
 
 
-def _large_torques(where: _Where, system: System, driven: Driven, t: Array) -> Iterator[Finding]:
+def _large_torques(where: _Context, system: System, driven: Driven, t: Array) -> Iterator[Finding]:
     mechanism = where.mechanism
     size = mechanism_size(mechanism) or system.size
     force, turning = _expected(system, mechanism, driven.acceleration, t)
@@ -347,7 +347,7 @@ def _large_torques(where: _Where, system: System, driven: Driven, t: Array) -> I
                 "torque-large", where.place,
                 f"motor {motor} gives up to {peak:.3g} {unit}, where mass, size, acceleration and loads come to "
                 f"{expected:.2g} {unit}",
-                _resisting(mechanism) or where.blame() or _singular(driven),
+                _resisting(mechanism) or where.likely_cause() or _singular(driven),
             )  # fmt: skip
 
 
@@ -359,7 +359,7 @@ def _expected(system: System, mechanism: Mechanism, acceleration: float, t: Arra
     return system.total_mass * felt + loads, turning
 
 
-def _large_forces(where: _Where, system: System, solution: Solution) -> Iterator[Finding]:
+def _large_forces(where: _Context, system: System, solution: Solution) -> Iterator[Finding]:
     """Yield large forces of joints and of prescribed motions; drives of a path have motors."""
     if not solution.multipliers.size:
         return
@@ -368,10 +368,10 @@ def _large_forces(where: _Where, system: System, solution: Solution) -> Iterator
     accelerations = np.stack([np.linalg.norm(solution.a[:, body.position], axis=1) for body in system.bodies])
     expected, turning = _expected(system, where.mechanism, float(np.median(np.max(accelerations, axis=0))), solution.t)
     # Entries are NaN at singular configurations, and for rows without multipliers in a method.
-    lasting = np.quantile(np.nan_to_num(np.abs(solution.multipliers)), 1.0 - _LASTING, axis=0)
-    lasting[system.packed.rows["kind"] != CONSTRAINT] = 0.0
+    sustained = np.quantile(np.nan_to_num(np.abs(solution.multipliers)), 1.0 - _PEAK_SHARE, axis=0)
+    sustained[system.packed.rows["kind"] != CONSTRAINT] = 0.0
     arms = np.array([size if row.endswith(" angle") else 1.0 for row in system.rows])
-    forces = lasting / arms
+    forces = sustained / arms
     k = int(np.argmax(forces))
     if forces[k] > FORCE * (expected + turning / size) > 0.0:
         joint = joint_of_row(system.rows[k])
@@ -379,7 +379,9 @@ def _large_forces(where: _Where, system: System, solution: Solution) -> Iterator
             "force-large", where.place,
             f"{joint} takes {forces[k]:.3g} N for a tenth of the time or more, where mass, acceleration and loads come "
             f"to {expected + turning / size:.2g} N",
-            where.blame() or _resisting(where.mechanism) or "look at masses (kg), stiffnesses and prescribed motions",
+            where.likely_cause()
+            or _resisting(where.mechanism)
+            or "look at masses (kg), stiffnesses and prescribed motions",
         )  # fmt: skip
 
 
@@ -394,7 +396,7 @@ def _moving(mechanism: Mechanism, solution: Solution) -> str:
     """List prescribed motions with their largest rates, and loads with their sizes."""
     named: list[str] = []
     for one in mechanism.prescribed:
-        rate = float(np.max(np.abs(one.law.evaluate(solution.t)[1])))
+        rate = float(np.max(np.abs(one.profile.evaluate(solution.t)[1])))
         unit = "m/s" if mechanism.slides(one.joint) else "rad/s"
         named.append(f"prescribed.{one.name} (up to {speed_text(rate, unit, 3)})")
     named += [f"load.{load.name} ({load.largest(solution.t):.3g} {load.unit})" for load in mechanism.loads]
@@ -407,7 +409,7 @@ def _singular(driven: Driven) -> str:
     return "look at masses (kg) and the path's acceleration (m/s^2)"
 
 
-def moved_far(system: System, assembly: Assembly, q: Array) -> Iterator[Finding]:
+def large_rotations(system: System, assembly: Assembly, q: Array) -> Iterator[Finding]:
     """Yield bodies that rotated far while an assembly was closed or drives moved to their start; q (n,)."""
     given = {name: pose.angle for name, pose in approximate_poses(system.mechanism, assembly).items()}
     found = {body.name: float(q[body.angle]) for body in system.bodies}

@@ -29,7 +29,7 @@ class Command(TyperCommand):
             values = given.get(option.name) or []
             # A switch may be repeated with the same value.
             if len(set(values) if option.is_flag else values) > 1:
-                raise _given_twice(option, values)
+                raise _duplicate_option(option, values)
 
 
 def _repeatable(param: Any) -> Any:
@@ -40,7 +40,7 @@ def _repeatable(param: Any) -> Any:
     return twin
 
 
-def _given_twice(option: TyperOption, values: list[Any]) -> InputError:
+def _duplicate_option(option: TyperOption, values: list[Any]) -> InputError:
     longest = max(option.opts, key=len)
     if option.is_flag:
         names = [longest if value else option.secondary_opts[0] for value in values]

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from paraflex.arguments import checked_arguments
 from paraflex.arrays import Array
-from paraflex.control.design.reach import frequency_of
+from paraflex.control.design.controllability import frequency_of
 from paraflex.control.design.sampled import SampledPlant, as_sampled, discretise, places
 from paraflex.control.laws.discrete import DiscreteModel, check_discrete, is_model, matrices_of
 from paraflex.errors import InputError, ResultWarning, warn_user, within
@@ -199,11 +199,11 @@ def closed_loop(
     places(sensors or (), plant.outputs, "inputs", "sensor")
     places(motors or (), plant.inputs, "outputs", "motor")
     plant = plant.select(motors, sensors)
-    wanted = (len(plant.outputs), len(plant.inputs))
-    if law.D.shape[::-1] != wanted:
+    shape = (len(plant.outputs), len(plant.inputs))
+    if law.D.shape[::-1] != shape:
         raise InputError(
             f"has {law.D.shape[1]} inputs and {law.D.shape[0]} outputs", field="controller", value=controller,
-            remedy=f"the model has {wanted[0]} sensors, {wanted[1]} motors: name as many, inputs=[...], outputs=[...]",
+            remedy=f"the model has {shape[0]} sensors, {shape[1]} motors: name as many, inputs=[...], outputs=[...]",
         )  # fmt: skip
     return ClosedLoop(plant, law, None if isinstance(model, SampledPlant) else model)
 

@@ -91,14 +91,16 @@ def _filtered(named: NamedMatrices, at: list[str], filters: list[StateSpace]) ->
     """Return the model with filters before some inputs: x' = A x + B (u + F w)."""
     A, B, C, D = named.matrices
     own = scipy.linalg.block_diag(*(one.A for one in filters))
-    made, into = (scipy.linalg.block_diag(*parts) for parts in zip(*((one.C, one.B) for one in filters), strict=True))
+    outputs, into = (
+        scipy.linalg.block_diag(*parts) for parts in zip(*((one.C, one.B) for one in filters), strict=True)
+    )
     direct = scipy.linalg.block_diag(*(one.D for one in filters))
     places = [named.inputs.index(name) for name in at]
     B_d, D_d = B[:, places], D[:, places]
     states = [f"{name} disturbance {k + 1}" for name, one in zip(at, filters, strict=True) for k in range(len(one.A))]
     matrices = StateSpace(
-        np.block([[A, B_d @ made], [np.zeros((len(own), len(A))), own]]),
+        np.block([[A, B_d @ outputs], [np.zeros((len(own), len(A))), own]]),
         np.block([[B, B_d @ direct], [np.zeros((len(own), B.shape[1])), into]]),
-        np.hstack([C, D_d @ made]), np.hstack([D, D_d @ direct]),
+        np.hstack([C, D_d @ outputs]), np.hstack([D, D_d @ direct]),
     )  # fmt: skip
     return NamedMatrices(matrices, (*named.states, *states), (*named.inputs, *map(_NOISE, at)), named.outputs)

@@ -134,17 +134,17 @@ def rate_feedback_gains(
     chosen = _pairs(model, plant, pairs)
     other = None if beside is None else named_law(beside)
 
-    def made(gains: Array, of: Any = plant) -> ClosedLoop:
+    def loop_of(gains: Array, of: Any = plant) -> ClosedLoop:
         law = RateFeedback(_table(chosen, gains), cutoff=cutoff).sampled(period)
         return closed_loop(of, law if other is None else side_by_side([other, law]), period=period, delay=delay)
 
-    search = _Search(made, len(chosen), margin, np.inf if largest is None else largest)
+    search = _Search(loop_of, len(chosen), margin, np.inf if largest is None else largest)
     start = _Tried(np.zeros(len(chosen)), search.vibrations(frequencies))
     best = search.best(start)
     before, after = (np.array([damped_frequency(complex(z), period) for z in each.poles]).T for each in (start, best))
     return RateGains(
         _table(chosen, best.gains), after[0], before[0], after[1], before[1], search.radius(best.gains),
-        search.bound(best), made(best.gains, model), cutoff,
+        search.bound(best), loop_of(best.gains, model), cutoff,
     )  # fmt: skip
 
 
@@ -158,11 +158,11 @@ class _Tried(NamedTuple):
 class _Search:
     """Search for the gains, with A = A_0 + sum of g_i A_i from the loops with one unit gain at a time."""
 
-    def __init__(self, made: Callable[[Array], ClosedLoop], count: int, margin: float, largest: float) -> None:
-        none = made(np.zeros(count))
+    def __init__(self, loop_of: Callable[[Array], ClosedLoop], count: int, margin: float, largest: float) -> None:
+        none = loop_of(np.zeros(count))
         self._period: float = none.plant.period
         self._A: Array = none.A
-        self._each: Array = np.array([made(row).A - self._A for row in np.eye(count)])
+        self._each: Array = np.array([loop_of(row).A - self._A for row in np.eye(count)])
         self._margin, self._largest = margin, largest
         self._slowest: float = self.radius(np.zeros(count))
         if self._slowest > 1.0 + _ON_CIRCLE:
@@ -246,7 +246,7 @@ class _Search:
         for _ in range(_ROUNDS if len(mean) > 1 else 0):
             before = best
             for k in range(len(mean)):
-                best = self._anew(best, k)
+                best = self._restarted_search(best, k)
             if self.least(best) <= self.least(before) * (1.0 + _GROWS):
                 break
         if not np.any(best.gains):
@@ -256,7 +256,7 @@ class _Search:
             )  # fmt: skip
         return best
 
-    def _anew(self, best: _Tried, k: int) -> _Tried:
+    def _restarted_search(self, best: _Tried, k: int) -> _Tried:
         """Search the gain of one pair again, from zero on, in both directions."""
         without = best.gains.copy()
         without[k] = 0.0
@@ -309,9 +309,9 @@ class _Search:
 def _nearest(each: Array, frequencies: Sequence[float]) -> list[int]:
     """Return the indices of the vibrations nearest to frequencies [Hz]."""
     found = []
-    for wanted in frequencies:
-        positive(wanted, "frequencies", "Hz")
-        found.append(int(np.argmin(np.abs(each - wanted))))
+    for frequency in frequencies:
+        positive(frequency, "frequencies", "Hz")
+        found.append(int(np.argmin(np.abs(each - frequency))))
     if not found or len(set(found)) < len(found):
         raise InputError("no vibration, or one named twice", field="frequencies", value=list(frequencies),
                          remedy=f"choose from {', '.join(f'{one:.4g}' for one in np.sort(each)[:8])} Hz")  # fmt: skip

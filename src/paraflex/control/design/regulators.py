@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from paraflex.arguments import checked_arguments, numbers_in
 from paraflex.arrays import Array
 from paraflex.control.design.coloured import disturbed_plant
-from paraflex.control.design.reach import check_reach
+from paraflex.control.design.controllability import check_controllable
 from paraflex.control.design.sampled import SampledPlant, as_sampled, places
 from paraflex.control.laws.estimators import kalman_filter, riccati
 from paraflex.control.laws.lqg_law import LQGDesign, Regulator
@@ -126,7 +126,7 @@ def lqg(
     InputError
         See `lqr`; a free motion or undamped vibration, named by its frequency, that the readings do not show.
     """
-    plant, lasting = disturbed_plant(model, period, delay, coloured or {})
+    plant, persistent = disturbed_plant(model, period, delay, coloured or {})
     regulator = _regulator(plant, deviations, effort, integrators or {}, state_weights)
     measured = tuple(measured)
     C = plant.rows(measured, "measured")
@@ -138,9 +138,9 @@ def lqg(
     if missing:
         raise InputError("has no noise", field="noise", value=missing[0], remedy="give its standard deviation, such as "
                          "pf.quantisation_noise(resolution)")  # fmt: skip
-    check_reach(plant, C.T, "measured", "is not seen by the readings", "measure more outputs", transposed=True)
+    check_controllable(plant, C.T, "measured", "is not seen by the readings", "measure more outputs", transposed=True)
     process = _disturbances(plant, regulator, disturbance, effort) + _padded(state_noise, plant, "state_noise")
-    process = process + lasting @ lasting.T
+    process = process + persistent @ persistent.T
     R = np.diag([given[name] ** 2 for name in measured])
     motors = plant.B[:, places(regulator.motors, plant.inputs, "effort", "input")]
     found = kalman_filter(plant.A, motors, C, process, R)
@@ -183,7 +183,7 @@ def _regulator(
     Q[:n, :n] = rows.T @ rows + _padded(extra, used, "state_weights")
     Q[n:, n:] = np.diag([1.0 / (largest[name] * time) ** 2 for name, time in times.items()])
     R = np.diag([1.0 / efforts[name] ** 2 for name in motors])
-    check_reach(used, used.B, "effort", "is not reached by the motors", "choose other motors")
+    check_controllable(used, used.B, "effort", "is not reached by the motors", "choose other motors")
     try:
         P = riccati(A, B, Q, R)
     except (np.linalg.LinAlgError, ValueError):

@@ -8,12 +8,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from paraflex.arguments import CheckedFields, given_as
+from paraflex.arguments import CheckedFields, named_in_errors
 from paraflex.control.laws.kinds import LAWS
 from paraflex.control.laws.law import Law, given, of_names
 from paraflex.control.loop.together import Numbers, check_distinct, check_name, check_whole, multiple_of
 from paraflex.errors import InputError, renamed, within
-from paraflex.mechanism import AngleLaw, Mechanism
+from paraflex.mechanism import Mechanism, TimeProfile
 from paraflex.mechanism.loads import InTime
 from paraflex.mechanism.measured import encoders_of, measured_sensors
 from paraflex.mechanism.quantities import all_known
@@ -30,7 +30,9 @@ Limits = float | tuple[float, float] | Mapping[str, float | tuple[float, float]]
 _DEFAULTS = ", ".join(f'"{law.reference}" with "{kind}"' for kind, law in LAWS.items() if law.reference)
 
 
-@given_as("a description of a controller", "a ControllerDescription, as [controller.NAME] of a model file is read")
+@named_in_errors(
+    "a description of a controller", "a ControllerDescription, as [controller.NAME] of a model file is read"
+)
 @dataclass(frozen=True)
 class ControllerDescription(CheckedFields):
     """Sampled controller as a model file describes it: a control law and its signal chain, see `SampledController`.
@@ -173,8 +175,8 @@ def _functions(reference: Any) -> Any:
     """Return references with angle laws replaced by functions of time."""
     if not isinstance(reference, Mapping):
         return reference
-    return {name: _value(each) if isinstance(each, AngleLaw) else each for name, each in reference.items()}
+    return {name: _value(each) if isinstance(each, TimeProfile) else each for name, each in reference.items()}
 
 
-def _value(law: AngleLaw) -> Callable[[float], float]:
+def _value(law: TimeProfile) -> Callable[[float], float]:
     return lambda t: float(law.evaluate(np.array([t]))[0][0])

@@ -9,13 +9,13 @@ from typing import Any, ClassVar, Literal, Self
 
 import numpy as np
 
-from paraflex.arguments import CheckedFields, given_as
+from paraflex.arguments import CheckedFields, named_in_errors
 from paraflex.arrays import Array
 from paraflex.control.laws.controllers import Plant
 from paraflex.errors import InputError
 from paraflex.mechanism import Mechanism
 from paraflex.mechanism.measured import encoders_of, measured_sensors
-from paraflex.mechanism.quantities import all_known, said
+from paraflex.mechanism.quantities import all_known, field_metadata
 
 # Kinds of control laws by their names in files; `kinds` imports the modules that define those of paraflex.
 LAWS: dict[str, type[Law]] = {}
@@ -38,7 +38,7 @@ def given(description: str, check: Any = None, unit: str = "", *, by: By | None 
         Default value; by default the field is required.
     """
     value: Any = {"default_factory": dict} if default == {} else {"default": default}
-    return field(**value, metadata=said(description, check, unit) | {"by": by})
+    return field(**value, metadata=field_metadata(description, check, unit) | {"by": by})
 
 
 class StartedLaw(ABC):
@@ -79,7 +79,7 @@ class StartedLaw(ABC):
         return self
 
 
-@given_as("a control law", "a law of any kind, say JointPID")
+@named_in_errors("a control law", "a law of any kind, say JointPID")
 @dataclass(frozen=True)
 class Law(CheckedFields, ABC):
     """Control law for `SampledController` and for files: the base class of all kinds.

@@ -140,7 +140,7 @@ def relaxing(base: InputSignals, t: float, begin: float, target: float, lag: flo
     return InputSignals(np.concatenate([starts, base.breaks[rest]]), coefficients)
 
 
-def with_room(signal: InputSignals, pieces: int | None = None) -> InputSignals:
+def padded_signal(signal: InputSignals, pieces: int | None = None) -> InputSignals:
     """Return a signal padded with unused pieces, beyond the times of any run.
 
     Parameters

@@ -44,15 +44,15 @@ class ChainSample(NamedTuple):
     ----------
     readings : (inputs,) array
         Readings after quantisation and filters, before references are subtracted.
-    wanted : (outputs,) array
+    requested : (outputs,) array
         Torques that the law returns.
-    given : (outputs,) array
+    applied : (outputs,) array
         Torques after saturation and rate limiting, which act after the delay.
     """
 
     readings: Array
-    wanted: Array
-    given: Array
+    requested: Array
+    applied: Array
 
 
 class ChainState(NamedTuple):

@@ -9,7 +9,7 @@ import numpy as np
 
 from paraflex.actuation import FeedForward
 from paraflex.arrays import Array
-from paraflex.control.loop.amplifiers import Amplifiers, relaxing, with_room
+from paraflex.control.loop.amplifiers import Amplifiers, padded_signal, relaxing
 from paraflex.control.loop.runs import TorqueLog
 from paraflex.control.loop.together import real_numbers
 from paraflex.dynamics import InputSignals, State, System, constant_signals, pack_signals
@@ -72,7 +72,7 @@ class HeldTorques:
         self.planned: FeedForward = replace(planned, signals=known_signals)
         lags = self.amplifiers.lags
         several: list[InputSignals] = [
-            with_room(each) if lag else each for each, lag in zip(known_signals, lags, strict=True)
+            padded_signal(each) if lag else each for each, lag in zip(known_signals, lags, strict=True)
         ]
         signals, knots = pack_signals(system.mechanism, several, end)
         self.signals: Signals = signals
@@ -82,7 +82,7 @@ class HeldTorques:
         self.held: Array = np.zeros(len(own))
         self.log: TorqueLog = TorqueLog(lags, start, self.held)
 
-    def given(self, torques: Torques) -> Array:
+    def of_motors(self, torques: Torques) -> Array:
         """Return the torques of all motors (all,) from those of `motors`, or from values by name.
 
         Raises
@@ -153,12 +153,12 @@ class HeldTorques:
     def _write(self) -> None:
         """Write the held torques into the signals."""
         breaks, coefficients, start = self.signals.breaks, self.signals.coefficients, self.signals.start
-        since, begun, given = self.log.last
+        since, begun, commanded = self.log.last
         for k, lag in enumerate(self.amplifiers.lags):
             pieces = slice(start[k], start[k + 1] - 1)
             if not lag:
-                coefficients[pieces, 0] = self.base[pieces] + given[k]
+                coefficients[pieces, 0] = self.base[pieces] + commanded[k]
                 continue
-            signal = relaxing(self.planned.signals[k], since, begun[k], given[k], lag)
-            whole = with_room(signal, pieces.stop - pieces.start)
+            signal = relaxing(self.planned.signals[k], since, begun[k], commanded[k], lag)
+            whole = padded_signal(signal, pieces.stop - pieces.start)
             breaks[pieces], coefficients[pieces] = whole.breaks[:-1], whole.coefficients

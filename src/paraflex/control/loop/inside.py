@@ -145,8 +145,8 @@ def _filters(controller: SampledController, inputs: int) -> dict[str, Array]:
     passed = (np.zeros((0, 0)), np.zeros((0, 1)), np.zeros((1, 0)), np.eye(1))
     A, B, C, D = (scipy.linalg.block_diag(*matrices) for matrices in
                   zip(*(each or passed for each in several), strict=True))  # fmt: skip
-    settled = np.linalg.solve(np.eye(len(A)) - A, B)
-    return {"filter_A": A, "filter_B": B, "filter_C": C, "filter_D": np.diag(D), "filter_start": settled}
+    steady = np.linalg.solve(np.eye(len(A)) - A, B)
+    return {"filter_A": A, "filter_B": B, "filter_C": C, "filter_D": np.diag(D), "filter_start": steady}
 
 
 def _reference_table(controller: SampledController, times: Array) -> Array:

@@ -139,8 +139,8 @@ def readings_in(run: TrackingRun | MotionRun, plant: Plant) -> list[AtSamples]:
 def readings_of(motion: RigidMotion, mechanism: Mechanism, names: Sequence[str]) -> dict[str, Array]:
     """Return the readings (k,) on a rigid motion by name, of encoders, tachometers and point sensors only."""
     sensors = {sensor.name: sensor for sensor in measured_sensors(mechanism)}
-    told = [sensors[name] for name in names if sensors[name].rigid]
+    rigid = [sensors[name] for name in names if sensors[name].rigid]
     system = motion.system
     nothing = np.zeros((motion.t.size, system.m)), np.zeros((motion.t.size, len(system.mechanism.motors)))
-    values = SensorReader(system, told)(motion.q, motion.v, motion.a, *nothing)
-    return {sensor.name: values[:, k] for k, sensor in enumerate(told)}
+    values = SensorReader(system, rigid)(motion.q, motion.v, motion.a, *nothing)
+    return {sensor.name: values[:, k] for k, sensor in enumerate(rigid)}

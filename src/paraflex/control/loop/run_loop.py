@@ -28,7 +28,7 @@ from paraflex.kernel.sampled import ACTED, SAMPLED, SampledLaw
 from paraflex.mechanism.quantities import not_negative
 
 
-class Due(NamedTuple):
+class PendingTorques(NamedTuple):
     """Torques (outputs,) of a controller, given by its index, that act from an instant on.
 
     The instant is `tick` + `part` shortest periods after the start.
@@ -58,9 +58,9 @@ class ControllerRecord:
         Sample times [s].
     readings : (k, inputs) array
         Readings, after quantisation and filters if the controller has such a chain.
-    wanted : (k, outputs) array
+    requested : (k, outputs) array
         Torques that the law returned [N m, N].
-    given : (k, outputs) array
+    applied : (k, outputs) array
         Torques after saturation and rate limiting, applied from t + delay on [N m, N].
     law : str
         Short description of the law.
@@ -81,8 +81,8 @@ class ControllerRecord:
     output_units: tuple[str, ...]
     t: Array
     readings: Array
-    wanted: Array
-    given: Array
+    requested: Array
+    applied: Array
     law: str
     limits: Array
     rates: Array
@@ -91,7 +91,7 @@ class ControllerRecord:
     @property
     def limited(self) -> Array:
         """Whether a limit was active, for each sample (k,)."""
-        return np.any(self.given != self.wanted, axis=1)
+        return np.any(self.applied != self.requested, axis=1)
 
 
 class LawFailure(Exception):
@@ -153,7 +153,7 @@ class Loop:
         self._delays = [whole_and_part(each.delay / self.period) for each in self.controllers]
         # Index of the next sample of each controller, delayed torques, and acting torques of each.
         self._next = [0] * len(self.controllers)
-        self._due: list[Due] = []
+        self._due: list[PendingTorques] = []
         self.acting: Array = np.zeros((len(self.controllers), len(motors)))
         for k, each in enumerate(self.controllers):
             self.acting[k, self._outputs[k]] = getattr(each, "holding_torques", 0.0)
@@ -222,7 +222,7 @@ class Loop:
             for k in sampled:
                 torques = self._step(k, self._next[k], self._start + tick * self.period, y[self._inputs[k]])
                 whole, rest = self._delays[k]
-                self._due.append(Due(tick + whole, rest, k, torques))
+                self._due.append(PendingTorques(tick + whole, rest, k, torques))
                 self._next[k] += 1
         acting = [due for due in self._due if (due.tick, due.part) <= (tick, part)]
         if not acting:
@@ -235,12 +235,12 @@ class Loop:
     def _step(self, k: int, number: int, t: float, y: Array) -> Array:
         name, controller, outputs = self.names[k], self.controllers[k], self._plants[k].outputs
         try:
-            given = controller.step(number, t, y)
+            returned = controller.step(number, t, y)
         except Exception as error:
             raise _raised(name, error) from error
-        torques = None if given is None else real_numbers(given)
+        torques = None if returned is None else real_numbers(returned)
         if torques is None:
-            kind = "complex numbers" if given is not None and np.iscomplexobj(given) else type(given).__name__
+            kind = "complex numbers" if returned is not None and np.iscomplexobj(returned) else type(returned).__name__
             raise LawFailure(f'controller "{name}" returned {kind}, not torques')
         torques = np.atleast_1d(torques)
         if torques.shape != (len(outputs),):
@@ -251,7 +251,7 @@ class Loop:
             raise _not_finite(name, wrong)
         last = getattr(controller, "last", None)
         record = last if isinstance(last, ChainSample) else ChainSample(y, torques, torques)
-        self.kept[k].append((t, record.readings, record.wanted, torques))
+        self.kept[k].append((t, record.readings, record.requested, torques))
         return torques
 
     def keep_last(self) -> None:
@@ -294,10 +294,10 @@ class Loop:
         controller, plant = self.controllers[k], self._plants[k]
         inside = self.inside
         if inside is None:
-            t, readings, wanted, given = list(zip(*self.kept[k], strict=True)) or [()] * 4
+            t, readings, requested, applied = list(zip(*self.kept[k], strict=True)) or [()] * 4
         else:
             kept = (inside.t, inside.readings, inside.wanted, inside.given)
-            t, readings, wanted, given = (each[: inside.counts[SAMPLED]] for each in kept)
+            t, readings, requested, applied = (each[: inside.counts[SAMPLED]] for each in kept)
         law, limits, rates = _bounds(controller, len(plant.outputs))
         return ControllerRecord(
             name=self.names[k],
@@ -309,8 +309,8 @@ class Loop:
             output_units=tuple(units(motor) for motor in plant.outputs),
             t=np.array(t, dtype=float),
             readings=_columns(readings, plant.inputs),
-            wanted=_columns(wanted, plant.outputs),
-            given=_columns(given, plant.outputs),
+            requested=_columns(requested, plant.outputs),
+            applied=_columns(applied, plant.outputs),
             law=law,
             limits=limits,
             rates=rates,
@@ -348,8 +348,8 @@ def _changing(controller: Controller) -> dict[str, Any]:
 
 
 def _raised(name: str, error: Exception) -> LawFailure:
-    said = " ".join(str(error).split())
-    return LawFailure(f'controller "{name}" raised {type(error).__name__}: {said}')
+    message = " ".join(str(error).split())
+    return LawFailure(f'controller "{name}" raised {type(error).__name__}: {message}')
 
 
 def _not_finite(name: str, motors: Sequence[str]) -> LawFailure:
@@ -387,15 +387,15 @@ def _bounds(controller: Controller, outputs: int) -> tuple[str, Array, Array]:
 
 def _names(controllers: Sequence[Controller]) -> list[str]:
     """Return the names of controllers, numbered where names are equal."""
-    given = [getattr(each, "name", "controller") for each in controllers]
-    for name in given:
+    names = [getattr(each, "name", "controller") for each in controllers]
+    for name in names:
         check_name(name)
-    if len(set(given)) == len(given):
-        return given
-    twice = [name for name in given if given.count(name) > 1]
+    if len(set(names)) == len(names):
+        return names
+    twice = [name for name in names if names.count(name) > 1]
     numbers = dict.fromkeys(twice, 0)
     found = []
-    for name in given:
+    for name in names:
         if name in numbers:
             numbers[name] += 1
             name = f"{name}{numbers[name]}"

@@ -10,7 +10,7 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
-from paraflex.arguments import given_as
+from paraflex.arguments import named_in_errors
 from paraflex.arrays import Array
 from paraflex.control.design.closed_loops import closed_loop, poles_beyond, unstable_poles
 from paraflex.control.laws.discrete import side_by_side
@@ -54,7 +54,7 @@ class Controlled:
         return self.acting
 
 
-@given_as("a run under controllers", "the run that Simulation.run returns")
+@named_in_errors("a run under controllers", "the run that Simulation.run returns")
 @dataclass(frozen=True)
 class ControlledTracking(Controlled, TrackingRun):
     """Run of a plan under torques that were set at discrete instants."""
@@ -65,12 +65,15 @@ class ControlledTracking(Controlled, TrackingRun):
         return True
 
     @cached_property
-    def doubts(self) -> tuple[Finding, ...]:
+    def findings(self) -> tuple[Finding, ...]:
         """Findings on controllers, on events in the run, and on results that are implausible for the mechanism."""
-        return (*unstable_loop(self, self.controllers, self.task.start.time, f"mode {self.mode.name}"), *super().doubts)
+        return (
+            *unstable_loop(self, self.controllers, self.task.start.time, f"mode {self.mode.name}"),
+            *super().findings,
+        )
 
 
-@given_as("a run under controllers", "the run that Simulation.run returns")
+@named_in_errors("a run under controllers", "the run that Simulation.run returns")
 @dataclass(frozen=True)
 class ControlledMotion(Controlled, MotionRun):
     """Run without a path under torques that were set at discrete instants."""
@@ -83,9 +86,9 @@ class ControlledMotion(Controlled, MotionRun):
         return True
 
     @cached_property
-    def doubts(self) -> tuple[Finding, ...]:
+    def findings(self) -> tuple[Finding, ...]:
         """Findings on controllers, on events in the run, and on implausible results."""
-        return (*unstable_loop(self, self.controllers, float(self.solution.t[0]), ""), *super().doubts)
+        return (*unstable_loop(self, self.controllers, float(self.solution.t[0]), ""), *super().findings)
 
 
 class TorqueLog:
@@ -105,7 +108,7 @@ class TorqueLog:
         self._lags, self._start = lags, start
         self._times: list[float] = []
         # Commanded torques, and torques that acted at the time of each command.
-        self._given: list[Array] = [before]
+        self._commanded: list[Array] = [before]
         self._begun: list[Array] = [before]
 
     def __len__(self) -> int:
@@ -116,34 +119,34 @@ class TorqueLog:
         """Add torques (motors,) that are commanded from a time on."""
         acting = self.now(t)
         self._times.append(t)
-        self._given.append(torques)
+        self._commanded.append(torques)
         self._begun.append(acting)
 
     @property
     def last(self) -> tuple[float, Array, Array]:
         """Time of the last command, torques that acted then, and torques commanded from then on (motors,)."""
-        return self._times[-1] if self._times else 0.0, self._begun[-1], self._given[-1]
+        return self._times[-1] if self._times else 0.0, self._begun[-1], self._commanded[-1]
 
     def copy(self) -> TorqueLog:
         """Return a copy that can be continued independently."""
-        other = TorqueLog(self._lags, self._start, self._given[0])
-        other._times, other._given, other._begun = self._times.copy(), self._given.copy(), self._begun.copy()
+        other = TorqueLog(self._lags, self._start, self._commanded[0])
+        other._times, other._commanded, other._begun = self._times.copy(), self._commanded.copy(), self._begun.copy()
         return other
 
     def now(self, t: float) -> Array:
         """Return the torques (motors,) that act at a time after the last command."""
-        since, begun, given = self.last
-        return self._relaxed(np.array([t - since]), begun[None], given[None])[0]
+        since, begun, commanded = self.last
+        return self._relaxed(np.array([t - since]), begun[None], commanded[None])[0]
 
     def at(self, times: Array, slack: float) -> Array:
         """Return the torques (k, motors) that act at times (k,), those before a change within a slack [s]."""
         number = self._number(times, slack)
         since = np.array([0.0, *self._times])[number]
-        return self._relaxed(times - since, np.array(self._begun)[number], np.array(self._given)[number])
+        return self._relaxed(times - since, np.array(self._begun)[number], np.array(self._commanded)[number])
 
     def given(self, times: Array, slack: float) -> Array:
         """Return the torques (k, motors) that are commanded at times (k,), those before a change within a slack [s]."""
-        return np.array(self._given)[self._number(times, slack)]
+        return np.array(self._commanded)[self._number(times, slack)]
 
     def _number(self, times: Array, slack: float) -> NDArray[np.int64]:
         """Return the indices of the commands that hold at times (k,); the first one holds at the start."""
@@ -153,13 +156,13 @@ class TorqueLog:
             number = np.where(times <= changes[0] + slack, 1, number)
         return number
 
-    def _relaxed(self, since: Array, begun: Array, given: Array) -> Array:
+    def _relaxed(self, since: Array, begun: Array, commanded: Array) -> Array:
         """Return the torques (k, motors) at times (k,) after their commands."""
         if not np.any(self._lags):
-            return given
+            return commanded
         lags = np.where(self._lags > 0.0, self._lags, 1.0)
         left = np.exp(-np.maximum(since, 0.0)[:, None] / lags)
-        return given + np.where(self._lags > 0.0, left, 0.0) * (begun - given)
+        return commanded + np.where(self._lags > 0.0, left, 0.0) * (begun - commanded)
 
 
 def unstable_loop(

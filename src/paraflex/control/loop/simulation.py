@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from paraflex.actuation import FeedForward, actuation_condition
-from paraflex.arguments import checked_arguments, given_as
+from paraflex.arguments import checked_arguments, named_in_errors
 from paraflex.arrays import Array
 from paraflex.control.laws.controllers import Controller, Plant
 from paraflex.control.laws.described import ControllerDescription
@@ -26,7 +26,7 @@ from paraflex.dynamics import State, System
 from paraflex.errors import ControllerError, InputError, IntegrationError, Moment, ResultWarning
 from paraflex.findings import warn_of
 from paraflex.integrators import IntegrationOptions, Method, Solution, Treatment, choose
-from paraflex.integrators.integrate import Integration, Kept
+from paraflex.integrators.integrate import Integration, IntegrationState
 from paraflex.kernel.sampled import SampledLaw
 from paraflex.kinematics import ModelWithPaths
 from paraflex.mechanism import ActuationMode, Mechanism, Start, mode_of_motors, parse_mode
@@ -34,13 +34,13 @@ from paraflex.mechanism.measured import encoders_of, measured_sensors
 from paraflex.mechanism.quantities import finite
 from paraflex.motion import motion_start
 from paraflex.tracking import Ending, TrackingTask
-from paraflex.validity import warn, with_blame
+from paraflex.validity import warn, with_likely_cause
 
 # Samples within this fraction of the run after a change of torques show the state just before it.
 _ROUNDING = 1e-12
 
 
-@given_as("a saved simulation", "what Simulation.save returned")
+@named_in_errors("a saved simulation", "what Simulation.save returned")
 @dataclass(frozen=True)
 class Saved:
     """Complete state of a simulation: see `Simulation.save`.
@@ -53,7 +53,7 @@ class Saved:
 
     time: float
     identity: str
-    kept: Kept
+    kept: IntegrationState
     torques: tuple[Array, TorqueLog]
     loop: Loop | None
     controllers: Any
@@ -132,7 +132,9 @@ class Simulation:
     ) -> None:
         self._options = _projecting(choose(method, options))
         self.task: TrackingTask | None = source if isinstance(source, TrackingTask) else None
-        self.mechanism: Mechanism = source.mechanism if isinstance(source, TrackingTask) else Mechanism.made_of(source)
+        self.mechanism: Mechanism = (
+            source.mechanism if isinstance(source, TrackingTask) else Mechanism.from_source(source)
+        )
         self.mode: ActuationMode = _mode(self.mechanism, mode)
         names = [motor.name for motor in self.mechanism.motors]
         self.motors: tuple[str, ...] = tuple(name for name in names if name in self.mode.motors)
@@ -216,13 +218,13 @@ class Simulation:
             The integration cannot continue, or an event of the options has ended the run; the error carries the run so
             far.
         """
-        given = self._torques.given(torques)
+        held = self._torques.of_motors(torques)
         if not is_number(until) or not self.time < until <= self.end * (1.0 + SAME):
             raise InputError(f"is not within the rest of the run, {self.time:.6g} to {self.end:.6g} s", field="until",
                              value=until, remedy="give a later time in it, or reset the simulation")  # fmt: skip
         with self._alone():
             self._use(None)
-            self._apply(given)
+            self._apply(held)
             self._march(min(until, self.end))
         if self._integration.status == "stopped":
             cause = f"the run has ended: {self._integration.message}"
@@ -339,20 +341,22 @@ class Simulation:
                 if controllers is not None:
                     self._begin(controllers if isinstance(controllers, list | tuple) else [controllers])
                 while self.time < end and not self.ended:
-                    self._go_on(end, on_progress)
+                    self._advance_to_next(end, on_progress)
                     if on_progress is not None:
                         on_progress(self.time)
         except KeyboardInterrupt:
             self._integration.interrupt()
         except LawFailure as failure:
             cause, moment = str(failure), Moment(self.time, self._integration.run.attempts)
-            partial = self._made(replace(self._integration.solution(), status="failed", message=f"{cause} at {moment}"))
+            partial = self._as_controlled(
+                replace(self._integration.solution(), status="failed", message=f"{cause} at {moment}")
+            )
             raise ControllerError(cause, moment, partial, "correct the controller") from failure.__cause__
-        made = self.result()
+        controlled = self.result()
         if warning:
-            warn(made.validity, "" if self.task is None else f"mode {self.mode.name}")
-            warn_of(made.doubts, ResultWarning)
-        return made
+            warn(controlled.validity, "" if self.task is None else f"mode {self.mode.name}")
+            warn_of(controlled.findings, ResultWarning)
+        return controlled
 
     def _begin(self, controllers: Sequence[Any]) -> None:
         """Restart under controllers, or in open loop if there are none."""
@@ -369,7 +373,7 @@ class Simulation:
             self._integration.start()
         self._use(loop)
 
-    def _go_on(self, end: float, on_progress: Callable[[float], None] | None) -> None:
+    def _advance_to_next(self, end: float, on_progress: Callable[[float], None] | None) -> None:
         """Advance to the next instant of the controllers, or to the end."""
         loop = self._loop
         if loop is None or loop.inside is not None:
@@ -395,33 +399,33 @@ class Simulation:
         try:
             solution = self._integration.solution()
         except IntegrationError as error:
-            with_blame(error, self.mechanism)
-            error.partial = self._made(error.partial)
+            with_likely_cause(error, self.mechanism)
+            error.partial = self._as_controlled(error.partial)
             raise
         if solution.status == "complete" and self.time < self.end:
             message = f"as far as t = {self.time:.6g} s"
             solution = replace(solution, status="interrupted", message=message)
-        return self._made(solution)
+        return self._as_controlled(solution)
 
     # --- Internals ---
 
-    def _made(self, solution: Solution) -> ControlledTracking | ControlledMotion:
+    def _as_controlled(self, solution: Solution) -> ControlledTracking | ControlledMotion:
         """Return the run with a solution."""
         k = solution.t.size - bool(solution.event)
         slack = _ROUNDING * (self.end - self._initial.time)
         log = self._torques.log
-        given, commanded = log.at(solution.t, slack), log.given(solution.t, slack)
+        applied, commanded = log.at(solution.t, slack), log.given(solution.t, slack)
         motors = {motor.name: unit for motor, unit in zip(self.mechanism.motors, self.mechanism.motor_units(),
                                                            strict=True)}  # fmt: skip
         records = () if self._loop is None else self._loop.records(motors.__getitem__)
         if self.task is None:
             times = solution.t if solution.event else self._times
             none = dict.fromkeys(motors, 0.0)
-            return ControlledMotion(self.system, times, none, solution, given, commanded, records)
+            return ControlledMotion(self.system, times, none, solution, applied, commanded, records)
         planned = self._torques.planned.evaluate(solution.t[:k])
         title = self._options.method.title
         return ControlledTracking(self.task, self._torques.planned, self._condition, solution, title,
-                                  acting=given[:k] + planned, commanded=commanded[:k] + planned,
+                                  acting=applied[:k] + planned, commanded=commanded[:k] + planned,
                                   controllers=records)  # fmt: skip
 
     def _use(self, loop: Loop | None) -> None:
@@ -488,7 +492,7 @@ class Simulation:
         failure = None if self._loop is None else self._loop.failure
         if failure is not None:
             raise failure
-        if not (self._integration.goes_on or self.ended):
+        if not (self._integration.can_continue or self.ended):
             self.result()
 
 

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import scipy
 
-from paraflex.arguments import CheckedFields, checked_arguments, given_as
+from paraflex.arguments import CheckedFields, checked_arguments, named_in_errors
 from paraflex.arrays import Array, Numbers
 from paraflex.errors import InputError
 from paraflex.limits import SHAPER_IMPULSES, at_most
@@ -53,7 +53,7 @@ class ShaperKind(Enum):
 _ORDERS = {ShaperKind.ZV: 1, ShaperKind.ZVD: 2, ShaperKind.ZVDD: 3}
 
 
-@given_as("a shaper", "a shaper, as paraflex.shaper makes it")
+@named_in_errors("a shaper", "a shaper, as paraflex.shaper makes it")
 @dataclass(frozen=True)
 class Shaper(CheckedFields):
     """Input shaper: impulses at `times` with `amplitudes` of sum one, so that a shaped command keeps its final value.

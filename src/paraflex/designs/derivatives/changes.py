@@ -14,7 +14,7 @@ from paraflex.actuation.feed_forward import splines
 from paraflex.arguments import with_fields
 from paraflex.arrays import Array, Numbers
 from paraflex.control.shaping.shaped import ShapedPath
-from paraflex.designs.derivatives.plans import Given
+from paraflex.designs.derivatives.plans import RunInputs
 from paraflex.designs.derivatives.stencil import STENCILS, Difference, Stencil
 from paraflex.designs.derivatives.steps import Stepped, another_layout, complex_step, part, stepped
 from paraflex.designs.run import Task
@@ -38,12 +38,12 @@ from paraflex.kernel.bodies import motion_forces
 from paraflex.kernel.packed import Signals, make_scratch
 from paraflex.kinematics import Circle, PathMotion, Polygon, RigidMotion
 from paraflex.kinematics.closure import PathClosure, with_marker
-from paraflex.kinematics.sensitivity import MotionChange, Nearby, motion_sensitivity
+from paraflex.kinematics.sensitivity import DisplacedClosure, MotionChange, motion_sensitivity
 from paraflex.mechanism import ActuationMode, FlexibleBeam, Mechanism, RigidBody, with_actuators
 from paraflex.tracking import TrackingTask, path_knots
 
 
-class Described(NamedTuple):
+class DescribedInputs(NamedTuple):
     """Inputs of a design's runs as its file describes them, which determine all other numbers.
 
     They are the mechanism, the path, the end of the run [s], the orientation of the end-effector and Baumgarte's
@@ -135,7 +135,7 @@ class Change:
     """
 
     stencil: Stencil
-    near: list[Described]
+    near: list[DescribedInputs]
 
     def __init__(self, setting: Setting, task: Task, planned: TrackingTask, k: int, size: float) -> None:
         self.name: str = setting.names[k]
@@ -145,8 +145,8 @@ class Change:
         here = _described(setting, task, planned.mechanism)
         self.stencil, self.near = self._near(setting, task, k)
         try:
-            self.stepped: Stepped[Described] = complex_step(here, self.near, self.stencil)
-            self.there: Described = self.stepped.value
+            self.stepped: Stepped[DescribedInputs] = complex_step(here, self.near, self.stencil)
+            self.there: DescribedInputs = self.stepped.value
             self.system: System = build_system(self.there.mechanism, planned.system)
             if not all(same_layout(each.packed, planned.system.packed) for each in self.beside):
                 raise another_layout()
@@ -155,9 +155,9 @@ class Change:
         self.closure: PathClosure = PathClosure(planned.mechanism.rigid(), here.orientation, here.end)
         self.end: float = here.end
 
-    def _near(self, setting: Setting, task: Task, k: int) -> tuple[Stencil, list[Described]]:
+    def _near(self, setting: Setting, task: Task, k: int) -> tuple[Stencil, list[DescribedInputs]]:
         """Return a stencil and the designs at its points: on both sides, or on one side if the other is invalid."""
-        trouble: ParaflexError | None = None
+        failure: ParaflexError | None = None
         for stencil in STENCILS:
             try:
                 near = [_described(setting, _moved(task, k, place * self.size)) for place in stencil.places]
@@ -165,9 +165,9 @@ class Change:
                 self.beside: list[System] = [build_system(each.mechanism) for each in (near[0], near[-1])]
                 return stencil, near
             except ParaflexError as error:
-                trouble = trouble or error
+                failure = failure or error
         raise InputError(
-            f"has no derivative: a nearby value fails, {trouble}", field=f"vary.{self.name}", value=task.values[k],
+            f"has no derivative: a nearby value fails, {failure}", field=f"vary.{self.name}", value=task.values[k],
             remedy="leave it out",
         )  # fmt: skip
 
@@ -195,12 +195,12 @@ class Change:
     @cached_property
     def knots(self) -> Numbers:
         """Knots of the path, with a complex step."""
-        laws = [law for load in self.planned.mechanism.loads for law in load.laws]
-        if any(law.knots for law in laws):
+        profiles = [profile for load in self.planned.mechanism.loads for profile in load.profiles]
+        if any(profile.knots for profile in profiles):
             raise InputError(
-                "loads whose law has pieces or a linear table: no derivative of the torques that a path takes",
+                "loads whose profile has pieces or a linear table: no derivative of the torques that a path takes",
                 field="load",
-                remedy='give their laws as one expression or a table of interpolation = "spline"',
+                remedy='give their profiles as one expression or a table of interpolation = "spline"',
             )
         knots = path_knots(self.there.path, self.there.end)
         if knots.size != self.planned.plan.knots.size:
@@ -229,7 +229,7 @@ class Change:
             angles = stepped(angles, self.stencil.derivative([near.turning(at) for near, at in moved]).value)
         return KnownPath(PathMotion(*whole), angles, duration)
 
-    def _nearby(self, motion: RigidMotion, d_times: Array, path: KnownPath) -> list[Nearby]:
+    def _nearby(self, motion: RigidMotion, d_times: Array, path: KnownPath) -> list[DisplacedClosure]:
         closure, stencil = self.closure, self.stencil
         effector = closure.mechanism.end_effector
         assert effector is not None
@@ -241,20 +241,20 @@ class Change:
         if path.angles is None and "angle" in effector.coordinates:
             target = target + 1j * np.imag(orientation) * np.eye(3)[0][:, None] * (closure.coordinates == 2)
         return [
-            Nearby(
-                place, weight, with_numbers(closure.packed, numbers + place * change), self._laws(near),
+            DisplacedClosure(
+                place, weight, with_numbers(closure.packed, numbers + place * change), self._prescribed_signals(near),
                 motion.t + place * d_times, target.real + place * part(target),
             )
             for place, weight, near in zip(stencil.places, stencil.weights, self.near, strict=True)
         ]  # fmt: skip
 
-    def _laws(self, near: Described) -> Any:
+    def _prescribed_signals(self, near: DescribedInputs) -> Any:
         mechanism = near.mechanism
         if not mechanism.prescribed:
             return self.closure.signals
         return still_signals(mechanism, near.end)[0]
 
-    def of_mode(self, nominal: Given) -> ModeChange:
+    def of_mode(self, nominal: RunInputs) -> ModeChange:
         """Return the derivatives of the inputs of the run of a mode."""
         torques = self._torques(nominal.torques)
         signals, stops = self._signals(nominal, torques)
@@ -308,7 +308,7 @@ class Change:
         )
         return replace(nominal, signals=signals, knots=stepped(knots, d_knots), times=stepped(nominal.times, d_times))
 
-    def _signals(self, nominal: Given, torques: FeedForward) -> tuple[Difference, Array]:
+    def _signals(self, nominal: RunInputs, torques: FeedForward) -> tuple[Difference, Array]:
         """Return the derivatives of the signals and of the stops."""
         problem, found, stops = nominal.problem, [], []
         d_knots, d_times = part(torques.knots), part(self.sampled.times)
@@ -411,12 +411,12 @@ def _condition(values: Array, planned: _Planned, torques: FeedForward) -> Number
     return stepped(values, (d_singular[:, 0] - values * d_singular[:, -1]) / singular[:, -1])
 
 
-def _described(setting: Setting, task: Task, mechanism: Mechanism | None = None) -> Described:
+def _described(setting: Setting, task: Task, mechanism: Mechanism | None = None) -> DescribedInputs:
     model, options = setting.design(task.values)
     path = model.path(task.path)
     end = model.duration(path, setting.duration)
     gains = (options.alpha, options.beta)
-    return Described(mechanism or model.mechanism, path, end, model.study.orientation, gains)
+    return DescribedInputs(mechanism or model.mechanism, path, end, model.study.orientation, gains)
 
 
 def _moved(task: Task, k: int, by: float) -> Task:

@@ -9,7 +9,7 @@ import numpy as np
 
 from paraflex.arrays import Array
 from paraflex.designs.derivatives.changes import Change, ModeChange
-from paraflex.designs.derivatives.plans import Given, check_has_path, check_open_and_whole, given, size_of
+from paraflex.designs.derivatives.plans import RunInputs, check_has_path, check_open_and_whole, run_inputs, size_of
 from paraflex.designs.derivatives.stencil import STENCILS
 from paraflex.designs.derivatives.steps import part, stepped
 from paraflex.designs.measure import measure, metric_columns, metric_values, smooth_metrics
@@ -100,10 +100,10 @@ def mode_gradients(setting: Setting, task: Task, sizes: Sequence[float | None] |
     sizes = [None] * len(setting.names) if sizes is None else sizes
     sizes = [size_of(setting, task, k, size) for k, size in enumerate(sizes)]
     changes = [Change(setting, task, planned, k, size) for k, size in enumerate(sizes)]
-    return [_of_mode(setting, given(planned, options, mode), mode, changes) for mode in setting.modes]
+    return [_of_mode(setting, run_inputs(planned, options, mode), mode, changes) for mode in setting.modes]
 
 
-def _of_mode(setting: Setting, nominal: Given, mode: str, changes: Sequence[Change]) -> ModeGradients:
+def _of_mode(setting: Setting, nominal: RunInputs, mode: str, changes: Sequence[Change]) -> ModeGradients:
     run = simulate(nominal.task, mode, options=nominal.options, warning=False)
     if run.solution.singular_positions:
         time = run.solution.singular_positions[0]
@@ -130,7 +130,7 @@ def _of_mode(setting: Setting, nominal: Given, mode: str, changes: Sequence[Chan
     )
 
 
-def _with_motion(run: TrackingRun, nominal: Given, motion: Motion) -> TrackingRun:
+def _with_motion(run: TrackingRun, nominal: RunInputs, motion: Motion) -> TrackingRun:
     """Return the run with the motion whose steps are solved to rounding."""
     energy = energies(nominal.problem.system.packed, motion.q, motion.v, motion.multipliers)
     solution = replace(
@@ -144,7 +144,7 @@ def _slopes(
     setting: Setting,
     run: TrackingRun,
     here: RunTraces,
-    nominal: Given,
+    nominal: RunInputs,
     found: RunDerivatives,
     k: int,
     change: ModeChange,
@@ -163,7 +163,7 @@ def _slopes(
     return np.where(np.isnan(np.real(values)), np.nan, part(values))
 
 
-def _stepped_energies(nominal: Given, motion: Motion, along: Motion, direction: Direction) -> Array:
+def _stepped_energies(nominal: RunInputs, motion: Motion, along: Motion, direction: Direction) -> Array:
     """Return `energies` with a complex step by differences, which are exact to rounding for products and sines."""
     packed, stencil = nominal.problem.system.packed, STENCILS[0]
     numbers = numbers_of(packed)

@@ -26,7 +26,7 @@ _STEP_OPTIONS = ("tolerance", "step")
 
 
 @dataclass(frozen=True)
-class Given:
+class RunInputs:
     """Inputs of the run of one mode.
 
     Attributes
@@ -153,18 +153,18 @@ def check_differentiable_study(setting: Setting, values: Sequence[float], column
         size_of(setting, Task(0, 0, tuple(values), setting.paths[0]), k, 1.0)
 
 
-def given(planned: TrackingTask, options: IntegrationOptions, mode: str) -> Given:
+def run_inputs(planned: TrackingTask, options: IntegrationOptions, mode: str) -> RunInputs:
     """Return the inputs of the run of a mode."""
-    return given_torques(planned, options, planned.torques(mode))
+    return inputs_with_torques(planned, options, planned.torques(mode))
 
 
-def given_torques(planned: TrackingTask, options: IntegrationOptions, torques: FeedForward) -> Given:
+def inputs_with_torques(planned: TrackingTask, options: IntegrationOptions, torques: FeedForward) -> RunInputs:
     """Return the inputs of a run with feed-forward torques, as in `simulate`."""
     times = planned.motion.t
     signals, knots = pack_signals(planned.mechanism, torques.signals, float(times[-1]))
     stops = np.sort(np.concatenate([path_stops(torques.knots, planned.mechanism), knots]))
     problem = make_problem(planned.system, signals, planned.start, times, stops)
-    return Given(planned, options, torques, actuation_condition(planned.effort, torques.mode), problem)
+    return RunInputs(planned, options, torques, actuation_condition(planned.effort, torques.mode), problem)
 
 
 def _nominal(setting: Setting, name: str, places: tuple[Place, ...]) -> float:

@@ -11,7 +11,7 @@ import numpy as np
 
 from paraflex.arrays import Array
 from paraflex.campaign.study import Result
-from paraflex.studies.optimisation.evaluate import Evaluated
+from paraflex.studies.optimisation.evaluate import EvaluatedDesign
 from paraflex.studies.optimisation.fit import residuals
 from paraflex.studies.optimisation.objective import Target
 from paraflex.studies.optimisation.study import DesignStudy
@@ -60,7 +60,7 @@ class Confidence:
     weakest: Mapping[str, float]
 
     @property
-    def telling(self) -> bool:
+    def identifiable(self) -> bool:
         """Whether the targets distinguish the parameters: the condition number is below `ILL_CONDITIONED`."""
         return self.condition < ILL_CONDITIONED
 
@@ -75,10 +75,10 @@ class Confidence:
             "correlation": [[x if math.isfinite(x) else None for x in row] for row in self.correlation.tolist()],
             "condition": self.condition if math.isfinite(self.condition) else None,
             "weakest": dict(self.weakest),
-            "telling": self.telling,
+            "telling": self.identifiable,
         }
 
-    def withheld(self, reason: str) -> Confidence:
+    def without_errors(self, reason: str) -> Confidence:
         """Return a copy without deviations and standard errors, with a reason for each free parameter."""
         none = dict.fromkeys(self.deviations)
         reasons = {name: self.reasons[name] if name not in self.free else reason for name in none}
@@ -96,7 +96,11 @@ def student_factor(freedom: int) -> float:
 
 
 def confidence(
-    study: DesignStudy[Result], targets: Sequence[Target], design: Evaluated, jacobian: Array, bound: Mapping[str, str]
+    study: DesignStudy[Result],
+    targets: Sequence[Target],
+    design: EvaluatedDesign,
+    jacobian: Array,
+    bound: Mapping[str, str],
 ) -> Confidence:
     """Estimate the deviations of the parameters from the Jacobian at the identified design.
 
@@ -106,7 +110,7 @@ def confidence(
         Study with the parameters and their ranges.
     targets : sequence of Target
         Targets of the identification.
-    design : Evaluated
+    design : EvaluatedDesign
         Identified design.
     jacobian : (targets, parameters) array
         Jacobian of the residuals with respect to the coordinates in the unit cube.
@@ -138,9 +142,9 @@ def confidence(
         spread = np.sqrt(np.diag(covariance))
         found = replace(found, correlation=covariance / np.outer(spread, spread))
     if freedom <= 0:
-        return found.withheld(f"{len(targets)} targets are too few to judge {len(free)} free parameters")
-    if not found.telling:
-        return found.withheld("the targets cannot tell the parameters apart")
+        return found.without_errors(f"{len(targets)} targets are too few to judge {len(free)} free parameters")
+    if not found.identifiable:
+        return found.without_errors("the targets cannot tell the parameters apart")
     left = _standard_deviation(targets, design, freedom)
     scaled = left * spread * study.per_unit(design.design)[free]
     errors = none | {names[k]: float(x) for k, x in zip(free, scaled, strict=True)}
@@ -153,8 +157,8 @@ def confidence(
 def checked(
     study: DesignStudy[Result],
     targets: Sequence[Target],
-    evaluate: Callable[[Sequence[tuple[float, ...]]], list[Evaluated]],
-    design: Evaluated,
+    evaluate: Callable[[Sequence[tuple[float, ...]]], list[EvaluatedDesign]],
+    design: EvaluatedDesign,
     jacobian: Array,
     found: Confidence,
 ) -> Confidence:
@@ -180,18 +184,18 @@ def checked(
         sides = done[2 * k : 2 * k + 2]
         along = ", ".join(f"{1e2 * step[j]:+.2g} % {study.setting.names[j]}" for j in free)
         if not all(each.complete for each in sides):
-            return found.withheld(f"a design one standard error away does not run (along {along} of the ranges)")
+            return found.without_errors(f"a design one standard error away does not run (along {along} of the ranges)")
         change = 0.5 * (residuals(targets, sides[1]) - residuals(targets, sides[0]))
-        said = jacobian @ step
-        off = float(np.linalg.norm(change - said) / np.linalg.norm(said))
+        predicted = jacobian @ step
+        off = float(np.linalg.norm(change - predicted) / np.linalg.norm(predicted))
         if not off <= _AGREES:
-            return found.withheld(
+            return found.without_errors(
                 f"one standard error along {along} of the ranges changes the residuals by {1e2 * off:.0f} % otherwise "
                 "than their derivatives say: noise of the runs, or no straight line"
             )
     return found
 
 
-def _standard_deviation(targets: Sequence[Target], design: Evaluated, freedom: int) -> float:
+def _standard_deviation(targets: Sequence[Target], design: EvaluatedDesign, freedom: int) -> float:
     """Estimate the standard deviation of the residuals from the fit."""
     return float(np.sqrt(np.sum(residuals(targets, design) ** 2) / freedom))

@@ -26,7 +26,7 @@ class LimitReached(Exception):
 
 
 @dataclass(frozen=True)
-class Evaluated:
+class EvaluatedDesign:
     """Evaluated design and the rows of its runs.
 
     Attributes
@@ -93,7 +93,7 @@ class Evaluate:
         journal: Journal,
         engine: Engine,
         run: RunTask = run_task,
-        on_evaluated: Callable[[Evaluate, Evaluated], None] | None = None,
+        on_evaluated: Callable[[Evaluate, EvaluatedDesign], None] | None = None,
         run_slopes: RunTask | None = None,
     ) -> None:
         self.study = study
@@ -102,18 +102,18 @@ class Evaluate:
         self.run = run
         self.on_evaluated = on_evaluated
         self.run_slopes = run_slopes
-        self.known: dict[Design, Evaluated] = {}
+        self.known: dict[Design, EvaluatedDesign] = {}
         self.fresh: int = 0
         self._rows = {row["id"]: row for row in checked_rows(journal)}
         self._numbers: dict[Design, int] = {}
         self._single = {mode: replace(study.setting, modes=(mode,)) for mode in study.setting.modes}
 
     @property
-    def history(self) -> list[Evaluated]:
+    def history(self) -> list[EvaluatedDesign]:
         """Evaluated designs in the order in which they were requested."""
         return sorted(self.known.values(), key=lambda each: each.number)
 
-    def __call__(self, designs: Sequence[Design]) -> list[Evaluated]:
+    def __call__(self, designs: Sequence[Design]) -> list[EvaluatedDesign]:
         """Evaluate designs, and return them with their rows in the given order.
 
         Raises
@@ -134,7 +134,7 @@ class Evaluate:
             raise LimitReached
         return [self.known[design] for design in designs]
 
-    def add_slopes(self, at: Evaluated) -> Evaluated:
+    def add_slopes(self, at: EvaluatedDesign) -> EvaluatedDesign:
         """Compute exact derivatives at a design, store them in its rows, and return the extended design."""
         assert self.run_slopes is not None
         for _, found in self._compute([at.design], self.run_slopes):
@@ -153,7 +153,7 @@ class Evaluate:
         return found
 
     def _keep(self, design: Design, rows: tuple[Row, ...]) -> None:
-        done = Evaluated(self._numbers[design], design, rows, self.study.columns)
+        done = EvaluatedDesign(self._numbers[design], design, rows, self.study.columns)
         self.known[design] = done
         if self.on_evaluated is not None:
             self.on_evaluated(self, done)

@@ -8,7 +8,7 @@ import numpy as np
 
 from paraflex.arrays import Array
 from paraflex.campaign.study import Result
-from paraflex.studies.optimisation.evaluate import Evaluate, Evaluated
+from paraflex.studies.optimisation.evaluate import Evaluate, EvaluatedDesign
 from paraflex.studies.optimisation.objective import Target
 from paraflex.studies.optimisation.slopes import Slopes
 from paraflex.studies.optimisation.study import DesignStudy
@@ -17,26 +17,26 @@ from paraflex.studies.optimisation.study import DesignStudy
 _FIT_TOLERANCE = 1e-6
 
 
-def residuals(targets: Sequence[Target], design: Evaluated) -> Array:
+def residuals(targets: Sequence[Target], design: EvaluatedDesign) -> Array:
     """Compute the residuals of all targets (targets,); they are infinite for a design that does not run."""
     if not design.complete:
         return np.full(len(targets), np.inf)
     return np.array([target.residual(design) for target in targets])
 
 
-def root_mean_square(targets: Sequence[Target], design: Evaluated) -> float:
+def root_mean_square(targets: Sequence[Target], design: EvaluatedDesign) -> float:
     """Compute the root mean square of the residuals."""
     return float(np.sqrt(np.mean(residuals(targets, design) ** 2)))
 
 
-def closest(targets: Sequence[Target], designs: Sequence[Evaluated]) -> Evaluated | None:
+def closest(targets: Sequence[Target], designs: Sequence[EvaluatedDesign]) -> EvaluatedDesign | None:
     """Return the complete design with the smallest residuals, the earliest of equal ones; None if there is none."""
     complete = [design for design in designs if design.complete]
     return min(complete, key=lambda each: (root_mean_square(targets, each), each.number), default=None)
 
 
 def fit(
-    study: DesignStudy[Result], targets: Sequence[Target], evaluate: Evaluate, slopes: Slopes, start: Evaluated
+    study: DesignStudy[Result], targets: Sequence[Target], evaluate: Evaluate, slopes: Slopes, start: EvaluatedDesign
 ) -> str:
     """Minimise the residuals from a start, and return the reason of termination as text.
 

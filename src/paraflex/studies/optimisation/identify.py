@@ -8,13 +8,13 @@ from functools import partial
 from pathlib import Path
 from typing import Any, ClassVar
 
-from paraflex.arguments import checked_arguments, given_as
+from paraflex.arguments import checked_arguments, named_in_errors
 from paraflex.campaign import OnProgress, Progress, Workers, kept_in
 from paraflex.designs.schema import study_table
 from paraflex.designs.units import check_unit_of_metric
 from paraflex.errors import InputError, suggestion
 from paraflex.studies.optimisation.confidence import Confidence, checked, confidence
-from paraflex.studies.optimisation.evaluate import Evaluate, Evaluated, LimitReached, RunTask
+from paraflex.studies.optimisation.evaluate import Evaluate, EvaluatedDesign, LimitReached, RunTask
 from paraflex.studies.optimisation.fit import closest, fit, residual_slopes, root_mean_square
 from paraflex.studies.optimisation.objective import Target
 from paraflex.studies.optimisation.problem import running_start
@@ -26,7 +26,7 @@ from paraflex.studies.optimisation.study import DesignStudy, SweepStudy, base_st
 
 
 @dataclass(frozen=True)
-class Reached:
+class TargetResult:
     """Target with its metric at the best design and at the start.
 
     Attributes
@@ -57,7 +57,7 @@ class IdentificationResult(SearchResult):
     ----------
     residual, start_residual : float or None
         Root mean square of all residuals at the best design and at the start; None before the start has run.
-    targets : tuple of Reached
+    targets : tuple of TargetResult
         Targets with the values reached.
     confidence : Confidence or None
         Confidence intervals of the parameters; None if the search ended before the derivatives at the best design were
@@ -69,7 +69,7 @@ class IdentificationResult(SearchResult):
     kind: ClassVar[str] = "identification"
     residual: float | None
     start_residual: float | None
-    targets: tuple[Reached, ...]
+    targets: tuple[TargetResult, ...]
     confidence: Confidence | None
     derivatives: str
 
@@ -81,7 +81,7 @@ class IdentificationResult(SearchResult):
         }
 
 
-@given_as("an identification", "what load_identification returns")
+@named_in_errors("an identification", "what load_identification returns")
 @dataclass(frozen=True)
 class IdentificationStudy(DesignStudy[IdentificationResult]):
     """Identification of the parameters that reproduce targets, by bounded least squares; see `DesignStudy`.
@@ -100,7 +100,7 @@ class IdentificationStudy(DesignStudy[IdentificationResult]):
         """Metrics of the targets."""
         return tuple(dict.fromkeys(target.column for target in self.targets))
 
-    def sought(self) -> dict[str, Any]:
+    def goal(self) -> dict[str, Any]:
         """Return the targets as plain values."""
         return {"targets": [vars(target) for target in self.targets]}
 
@@ -192,7 +192,7 @@ class _Solution:
 
     def __init__(self, study: IdentificationStudy) -> None:
         self.study = study
-        self.best: Evaluated | None = None
+        self.best: EvaluatedDesign | None = None
         self.confidence: Confidence | None = None
         self.derivatives = ""
 
@@ -240,15 +240,15 @@ def _result(study: IdentificationStudy, folder: Path, solution: _Solution, sessi
     )
 
 
-def _reached(target: Target, best: Evaluated, start: Evaluated) -> Reached:
+def _reached(target: Target, best: EvaluatedDesign, start: EvaluatedDesign) -> TargetResult:
     reached, before = (float(each.metric(target.column)[target.run]) for each in (best, start))
-    return Reached(target, reached, before, target.residual(best))
+    return TargetResult(target, reached, before, target.residual(best))
 
 
-def _watch(study: IdentificationStudy, on_progress: OnProgress) -> Callable[[Evaluate, Evaluated], None]:
+def _watch(study: IdentificationStudy, on_progress: OnProgress) -> Callable[[Evaluate, EvaluatedDesign], None]:
     least: list[float] = []
 
-    def watch(evaluate: Evaluate, done: Evaluated) -> None:
+    def watch(evaluate: Evaluate, done: EvaluatedDesign) -> None:
         if done.complete:
             least[:] = [min([root_mean_square(study.targets, done), *least])]
         best = least[0] if least else None

@@ -158,8 +158,8 @@ def load_indices(
             remedy=f"give {max(_FEWEST_BASE_SAMPLES, 1 << max(number, 1).bit_length())}",
         )  # fmt: skip
     at_most(number * (len(base.parameters) + 2), DESIGNS, "--samples", "too many designs")
-    wanted = metrics or [name for name in base.setting.metrics if not METRICS[name].each]
-    columns = _columns(wanted, base)
+    metric_names = metrics or [name for name in base.setting.metrics if not METRICS[name].each]
+    columns = _columns(metric_names, base)
     problem = _problem(base.setting.names)
     points = _salib().sample.sobol.sample(problem, number, calc_second_order=False, seed=chosen)
     designs = np.stack([p.spread(column) for p, column in zip(base.parameters, points.T, strict=True)], axis=1)

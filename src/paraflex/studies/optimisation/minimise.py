@@ -68,7 +68,7 @@ def _tolerance(problem: DesignProblem) -> float:
 
 
 def _slsqp(problem: DesignProblem, start: Array) -> str:
-    limits = {"type": "ineq", "fun": problem.room, "jac": problem.room_slope}
+    limits = {"type": "ineq", "fun": problem.slack, "jac": problem.slack_gradient}
     constraints = [limits] if problem.objective.limits else []
     options = {"ftol": _tolerance(problem) * problem.cost, "maxiter": _ITERATION_LIMIT}
     return _scipy(problem, start, "SLSQP", constraints=constraints, options=options)
@@ -77,7 +77,7 @@ def _slsqp(problem: DesignProblem, start: Array) -> str:
 def _trust(problem: DesignProblem, start: Array) -> str:
     from scipy.optimize import NonlinearConstraint
 
-    limits = NonlinearConstraint(problem.room, 0.0, np.inf, jac=problem.room_slope)  # pyright: ignore[reportArgumentType]
+    limits = NonlinearConstraint(problem.slack, 0.0, np.inf, jac=problem.slack_gradient)  # pyright: ignore[reportArgumentType]
     constraints = [limits] if problem.objective.limits else []
     tolerance = _tolerance(problem)
     options = {

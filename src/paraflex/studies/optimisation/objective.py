@@ -73,19 +73,19 @@ class Objective:
         ]
         return np.sum(terms, axis=0)
 
-    def room(self, design: Measured) -> Array:
+    def slack(self, design: Measured) -> Array:
         """Compute the margins of metrics to their limits (limits,), relative to the limit (to 1 if it is 0)."""
         metrics = self.metrics(design)
         return np.array([(limit - metrics[column]) / (abs(limit) or 1.0) for column, limit in self.limits])
 
-    def room_slope(self, design: Measured, slopes: Mapping[str, Array]) -> Array:
+    def slack_gradient(self, design: Measured, slopes: Mapping[str, Array]) -> Array:
         """Compute the derivatives of `room` (limits, parameters)."""
         rows = [-(self._shares(design, column) @ slopes[column]) / (abs(limit) or 1.0) for column, limit in self.limits]
         return np.array(rows)
 
     def violation(self, design: Measured) -> float:
         """Compute the sum of the relative violations of the limits."""
-        return float(np.sum(np.maximum(-self.room(design), 0.0)))
+        return float(np.sum(np.maximum(-self.slack(design), 0.0)))
 
     def _shares(self, design: Measured, column: str) -> Array:
         """Compute the weight of each run in the worst or mean value of a metric (runs,)."""

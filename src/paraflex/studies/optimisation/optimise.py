@@ -8,13 +8,13 @@ from functools import partial
 from pathlib import Path
 from typing import Any, ClassVar
 
-from paraflex.arguments import checked_arguments, given_as
+from paraflex.arguments import checked_arguments, named_in_errors
 from paraflex.campaign import OnProgress, Progress, Workers, kept_in
 from paraflex.designs.schema import study_table
 from paraflex.designs.units import check_unit_of_metric
 from paraflex.errors import InputError
 from paraflex.results.metrics import Members
-from paraflex.studies.optimisation.evaluate import Evaluate, Evaluated, RunTask
+from paraflex.studies.optimisation.evaluate import Evaluate, EvaluatedDesign, RunTask
 from paraflex.studies.optimisation.minimise import DEFAULT_SEARCH, minimise
 from paraflex.studies.optimisation.objective import Objective
 from paraflex.studies.optimisation.problem import DesignProblem, best_of, holds_limits
@@ -36,7 +36,7 @@ class OptimisationResult(SearchResult):
     ----------
     method : str
         Name of the optimisation method.
-    sought : mapping
+    goal : mapping
         Objective function as plain values.
     objective, start_objective : float or None
         Objective at the best design and at the start; None before the start has run.
@@ -48,7 +48,7 @@ class OptimisationResult(SearchResult):
 
     kind: ClassVar[str] = "optimisation"
     method: str
-    sought: Mapping[str, Any]
+    goal: Mapping[str, Any]
     objective: float | None
     start_objective: float | None
     metrics: Mapping[str, float]
@@ -56,7 +56,7 @@ class OptimisationResult(SearchResult):
     holds_limits: bool
 
 
-@given_as("an optimisation", "what load_optimisation returns")
+@named_in_errors("an optimisation", "what load_optimisation returns")
 @dataclass(frozen=True)
 class OptimisationStudy(DesignStudy[OptimisationResult]):
     """Optimisation study: the search for the design with the least objective; see `DesignStudy`.
@@ -74,7 +74,7 @@ class OptimisationStudy(DesignStudy[OptimisationResult]):
         """Metrics of the objective and its limits."""
         return self.objective.columns
 
-    def sought(self) -> dict[str, Any]:
+    def goal(self) -> dict[str, Any]:
         """Return the objective as plain values."""
         return {"objective": vars(self.objective) | {"weights": dict(self.objective.weights)}}
 
@@ -103,7 +103,7 @@ class OptimisationStudy(DesignStudy[OptimisationResult]):
             Start that cannot be run; see `Study.run` for other reasons.
         """
         folder = kept_in(folder)
-        watch = _Watch(self, on_progress)
+        watch = _ProgressCallback(self, on_progress)
         result, solve = partial(_result, self, folder), partial(_solve, self)
         return search(self, folder, (workers or Workers()).open, solve, watch, run=run, result=result)
 
@@ -190,7 +190,7 @@ def _result(study: OptimisationStudy, folder: Path, session: Session) -> Optimis
     return OptimisationResult(
         **of_session(study, folder, session, best),
         method=study.search.method or DEFAULT_SEARCH,
-        sought=study.sought()["objective"],
+        goal=study.goal()["objective"],
         objective=None if best is None else objective.value(best, scales),
         start_objective=objective.value(start, scales) if start is not None and running else None,
         metrics={} if best is None else objective.metrics(best),
@@ -205,15 +205,15 @@ def _result(study: OptimisationStudy, folder: Path, session: Session) -> Optimis
     )
 
 
-class _Watch:
+class _ProgressCallback:
     """Callback that reports the progress of an optimisation, with the best objective so far."""
 
     def __init__(self, study: OptimisationStudy, on_progress: OnProgress | None) -> None:
         self.study, self.objective, self.on_progress = study, study.objective, on_progress
-        self.best: Evaluated | None = None
+        self.best: EvaluatedDesign | None = None
         self.scales: Mapping[str, float] | None = None
 
-    def __call__(self, evaluate: Evaluate, done: Evaluated) -> None:
+    def __call__(self, evaluate: Evaluate, done: EvaluatedDesign) -> None:
         """Record an evaluated design and report the progress; the first design is the start."""
         if self.on_progress is None:
             return

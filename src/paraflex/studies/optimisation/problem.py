@@ -10,7 +10,7 @@ import numpy as np
 from paraflex.arrays import Array
 from paraflex.campaign.study import Result
 from paraflex.errors import InputError
-from paraflex.studies.optimisation.evaluate import Evaluate, Evaluated
+from paraflex.studies.optimisation.evaluate import Evaluate, EvaluatedDesign
 from paraflex.studies.optimisation.objective import Objective
 from paraflex.studies.optimisation.slopes import Slopes
 from paraflex.studies.optimisation.study import DesignStudy
@@ -66,7 +66,7 @@ class DesignProblem:
         (start,) = self.evaluate([self.study.start])
         return abs(self.objective.value(start, self.scales)) or 1.0
 
-    def at(self, x: Array) -> Evaluated:
+    def at(self, x: Array) -> EvaluatedDesign:
         """Evaluate the design at a point of the unit cube."""
         return self.evaluate([self.study.design(x)])[0]
 
@@ -90,19 +90,19 @@ class DesignProblem:
         away = x - self._safe
         return _REFUSED * self.cost * away / (float(np.linalg.norm(away)) or 1.0)
 
-    def room(self, x: Array) -> Array:
+    def slack(self, x: Array) -> Array:
         """Compute the margins of metrics to their limits (limits,); -1 if the design fails."""
         design = self.at(x)
-        return self.objective.room(design) if design.complete else np.full(len(self.objective.limits), -1.0)
+        return self.objective.slack(design) if design.complete else np.full(len(self.objective.limits), -1.0)
 
-    def room_slope(self, x: Array) -> Array:
+    def slack_gradient(self, x: Array) -> Array:
         """Compute the derivatives of `room` (limits, parameters); zero if the design fails."""
         design = self.at(x)
         if design.complete:
-            return self.objective.room_slope(design, self.slopes(design))
+            return self.objective.slack_gradient(design, self.slopes(design))
         return np.zeros((len(self.objective.limits), x.size))
 
-    def _score(self, design: Evaluated) -> float:
+    def _score(self, design: EvaluatedDesign) -> float:
         if not design.complete:
             return _FAILED * self.cost
         violation = self.objective.violation(design)
@@ -111,7 +111,7 @@ class DesignProblem:
         return self.objective.value(design, self.scales)
 
 
-def running_start(study: DesignStudy[Result], evaluate: Evaluate) -> Evaluated:
+def running_start(study: DesignStudy[Result], evaluate: Evaluate) -> EvaluatedDesign:
     """Evaluate the start, and check that it runs.
 
     Raises
@@ -128,13 +128,15 @@ def running_start(study: DesignStudy[Result], evaluate: Evaluate) -> Evaluated:
     return start
 
 
-def best_of(objective: Objective, scales: Mapping[str, float], designs: Sequence[Evaluated]) -> Evaluated | None:
+def best_of(
+    objective: Objective, scales: Mapping[str, float], designs: Sequence[EvaluatedDesign]
+) -> EvaluatedDesign | None:
     """Return the complete design within the limits with the least objective, or else that with the least violation.
 
     None is returned if no design is complete.
     """
 
-    def rank(design: Evaluated) -> tuple[float, float, int]:
+    def rank(design: EvaluatedDesign) -> tuple[float, float, int]:
         violation = objective.violation(design)
         value = objective.value(design, scales)
         return (violation if violation > _LIMIT_EXCESS else 0.0, value, design.number)
@@ -142,6 +144,6 @@ def best_of(objective: Objective, scales: Mapping[str, float], designs: Sequence
     return min((design for design in designs if design.complete), key=rank, default=None)
 
 
-def holds_limits(objective: Objective, design: Evaluated) -> bool:
+def holds_limits(objective: Objective, design: EvaluatedDesign) -> bool:
     """Check whether a design satisfies all limits."""
     return objective.violation(design) <= _LIMIT_EXCESS

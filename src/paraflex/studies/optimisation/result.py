@@ -11,7 +11,7 @@ from typing import Any, ClassVar
 from paraflex.campaign import KeptResult
 from paraflex.campaign.study import Result
 from paraflex.files.overlay import overlaid
-from paraflex.studies.optimisation.evaluate import Evaluated
+from paraflex.studies.optimisation.evaluate import EvaluatedDesign
 from paraflex.studies.optimisation.session import Session
 from paraflex.studies.optimisation.study import DesignStudy
 from paraflex.writing import GO_ON, write_json, write_text
@@ -90,7 +90,9 @@ class SearchResult(KeptResult):
             write_best(folder, study, tuple(self.values.values()))
 
 
-def of_session(study: DesignStudy[Result], folder: Path, session: Session, best: Evaluated | None) -> dict[str, Any]:
+def of_session(
+    study: DesignStudy[Result], folder: Path, session: Session, best: EvaluatedDesign | None
+) -> dict[str, Any]:
     """Return the fields of a `SearchResult` for a session and its best design, without the history."""
     history, names = session.evaluate.history, study.setting.names
     reasons = [each.reason for each in history if not each.complete]

@@ -16,7 +16,7 @@ from paraflex.designs.reopen import study_account
 from paraflex.designs.run import is_row_of, run_task, table_schema
 from paraflex.designs.samples import SOBOL, designs
 from paraflex.errors import InputError
-from paraflex.studies.optimisation.evaluate import Evaluate, Evaluated, LimitReached, RunTask
+from paraflex.studies.optimisation.evaluate import Evaluate, EvaluatedDesign, LimitReached, RunTask
 from paraflex.studies.optimisation.minimise import DEFAULT_SEARCH, WITH_SLOPES
 from paraflex.studies.optimisation.slopes import (
     DIFFERENCES,
@@ -54,14 +54,14 @@ class Session:
     seconds: float
 
 
-class Found(Protocol):
+class SearchOutcome(Protocol):
     """Protocol of the result of a search."""
 
     def write(self, study: DesignStudy[Result], folder: Path) -> None:
         """Write the result into a folder."""
 
 
-R = TypeVar("R", bound=Found)
+R = TypeVar("R", bound=SearchOutcome)
 
 
 def search(
@@ -69,7 +69,7 @@ def search(
     folder: Path,
     open_workers: Callable[[], Engine],
     solve: Callable[[Evaluate], str],
-    on_evaluated: Callable[[Evaluate, Evaluated], None] | None = None,
+    on_evaluated: Callable[[Evaluate, EvaluatedDesign], None] | None = None,
     *,
     run: RunTask | None = None,
     result: Callable[[Session], R],
@@ -129,14 +129,14 @@ def record_schema(study: DesignStudy[Result], *, slopes: bool) -> pa.Schema:
 
 
 def sampled_start(
-    study: DesignStudy[Result], evaluate: Evaluate, best: Callable[[list[Evaluated]], Evaluated | None]
-) -> Evaluated:
+    study: DesignStudy[Result], evaluate: Evaluate, best: Callable[[list[EvaluatedDesign]], EvaluatedDesign | None]
+) -> EvaluatedDesign:
     """Evaluate the start and the initial samples of the study, and return the best of them."""
-    number, asked = study.search.samples, [study.start]
+    number, batch = study.search.samples, [study.start]
     if number:
         points = designs(study.parameters, SOBOL, number, study.search.seed)
-        asked += [study.design(study.unit(point)) for point in points.tolist()]
-    done = evaluate(asked)
+        batch += [study.design(study.unit(point)) for point in points.tolist()]
+    done = evaluate(batch)
     return best(done) or done[0]
 
 
@@ -156,8 +156,8 @@ def _slopes_run(study: DesignStudy[Result], run: RunTask | None) -> RunTask | No
     InputError
         Exact derivatives requested but not available, or not used by the method.
     """
-    asked = study.search.gradients
-    if asked == DIFFERENCES or (asked is None and (run is not None or not study.least_squares)):
+    requested = study.search.gradients
+    if requested == DIFFERENCES or (requested is None and (run is not None or not study.least_squares)):
         return None
     method = study.search.method or DEFAULT_SEARCH
     if not study.least_squares and method not in WITH_SLOPES:
@@ -166,7 +166,7 @@ def _slopes_run(study: DesignStudy[Result], run: RunTask | None) -> RunTask | No
             remedy=f"leave it out, or choose from {', '.join(WITH_SLOPES)}",
         )  # fmt: skip
     reason = no_exact_slopes(study)
-    if reason and asked == EXACT:
+    if reason and requested == EXACT:
         raise InputError(
             f"no exact derivatives ({reason})", field="search.gradients", value=EXACT, remedy='write "differences"'
         )

@@ -11,10 +11,10 @@ import numpy as np
 from paraflex.arrays import Array
 from paraflex.campaign import Row
 from paraflex.campaign.study import Result
-from paraflex.designs.run import Outcome, Task, trouble
+from paraflex.designs.run import Outcome, Task, error_row
 from paraflex.designs.setting import Setting
 from paraflex.errors import InputError, NumericalError
-from paraflex.studies.optimisation.evaluate import Evaluate, Evaluated
+from paraflex.studies.optimisation.evaluate import Evaluate, EvaluatedDesign
 from paraflex.studies.optimisation.study import DesignStudy
 
 EXACT, DIFFERENCES = "exact", "differences"
@@ -36,7 +36,7 @@ def slope_column(column: str, parameter: str) -> str:
 class Slopes(Protocol):
     """Protocol of a function that computes derivatives of the metrics of an objective or of targets."""
 
-    def __call__(self, at: Evaluated) -> Mapping[str, Array]:
+    def __call__(self, at: EvaluatedDesign) -> Mapping[str, Array]:
         """Compute the derivatives at a complete design, a (runs, parameters) array for each column."""
         ...
 
@@ -60,7 +60,7 @@ class Differences:
         self.evaluate = evaluate
         self.step = study.search.difference
 
-    def __call__(self, at: Evaluated) -> Mapping[str, Array]:
+    def __call__(self, at: EvaluatedDesign) -> Mapping[str, Array]:
         """Compute the derivatives; see `Slopes`."""
         if self.step is None:
             self.step = float(np.clip(np.cbrt(relative_noise(self.study, self.evaluate, at)), _LEAST_STEP, _MOST_STEP))
@@ -76,7 +76,7 @@ class ExactSlopes:
     otherwise: Slopes
     reasons: list[str] = field(default_factory=list)
 
-    def __call__(self, at: Evaluated) -> Mapping[str, Array]:
+    def __call__(self, at: EvaluatedDesign) -> Mapping[str, Array]:
         """Compute the derivatives; see `Slopes`."""
         if not _has_slopes(self.study, at):
             at = self.evaluate.add_slopes(at)
@@ -87,7 +87,7 @@ class ExactSlopes:
         return exact_slopes(self.study, at)
 
 
-def relative_noise(study: DesignStudy[Result], evaluate: Evaluate, at: Evaluated) -> float:
+def relative_noise(study: DesignStudy[Result], evaluate: Evaluate, at: EvaluatedDesign) -> float:
     """Estimate the largest relative noise of a metric from closely spaced designs on a line; 0 if one does not run."""
     middle = study.unit(at.design)
     # Along the diagonal, away from the nearer bounds, over the span of the smallest central difference.
@@ -104,7 +104,9 @@ def relative_noise(study: DesignStudy[Result], evaluate: Evaluate, at: Evaluated
     return noise
 
 
-def differences(study: DesignStudy[Result], evaluate: Evaluate, at: Evaluated, step: float) -> Mapping[str, Array]:
+def differences(
+    study: DesignStudy[Result], evaluate: Evaluate, at: EvaluatedDesign, step: float
+) -> Mapping[str, Array]:
     """Compute central differences, with all designs evaluated at once.
 
     The step is a fraction of the range. It should be large compared with the noise from the choice of time steps, and
@@ -124,7 +126,7 @@ def differences(study: DesignStudy[Result], evaluate: Evaluate, at: Evaluated, s
     return columns
 
 
-def _moved(study: DesignStudy[Result], at: Evaluated, k: int, place: float) -> tuple[float, ...]:
+def _moved(study: DesignStudy[Result], at: EvaluatedDesign, k: int, place: float) -> tuple[float, ...]:
     """Return a design with one parameter moved to another unit-cube coordinate."""
     if place == study.unit(at.design)[k]:
         return at.design
@@ -132,7 +134,7 @@ def _moved(study: DesignStudy[Result], at: Evaluated, k: int, place: float) -> t
     return (*at.design[:k], moved, *at.design[k + 1 :])
 
 
-def exact_slopes(study: DesignStudy[Result], at: Evaluated) -> Mapping[str, Array]:
+def exact_slopes(study: DesignStudy[Result], at: EvaluatedDesign) -> Mapping[str, Array]:
     """Return the exact derivatives stored in the rows, scaled to unit-cube coordinates; see `run_slopes`."""
     scale = study.per_unit(at.design)
     return {
@@ -141,7 +143,7 @@ def exact_slopes(study: DesignStudy[Result], at: Evaluated) -> Mapping[str, Arra
     }
 
 
-def _has_slopes(study: DesignStudy[Result], at: Evaluated) -> bool:
+def _has_slopes(study: DesignStudy[Result], at: EvaluatedDesign) -> bool:
     columns = [slope_column(column, name) for column in study.columns for name in study.setting.names]
     return all(row.get(NO_SLOPES) or all(row.get(each) is not None for each in columns) for row in at.rows)
 
@@ -191,7 +193,7 @@ def run_slopes(
                 row |= {slope_column(column, name): x for name, x in zip(setting.names, found, strict=True)}
         # After any failure of exact derivatives, finite differences are used.
         except Exception as error:
-            row[NO_SLOPES] = trouble(error)["reason"]
+            row[NO_SLOPES] = error_row(error)["reason"]
         rows.append(row)
     return Outcome(task, rows)
 

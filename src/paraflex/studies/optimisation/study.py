@@ -13,7 +13,7 @@ import numpy as np
 from paraflex.arrays import Array
 from paraflex.campaign.study import R_co, Study
 from paraflex.designs.measure import check_metric, metric_of
-from paraflex.designs.samples import RANDOM, Varied
+from paraflex.designs.samples import RANDOM, SweptParameter
 from paraflex.designs.schema import SamplingTable
 from paraflex.designs.setting import INTEGRATION, Setting
 from paraflex.designs.sweep import SweepStudy, make_study
@@ -97,7 +97,7 @@ class DesignStudy(Study[R_co]):
         return self.base.setting
 
     @property
-    def parameters(self) -> tuple[Varied, ...]:
+    def parameters(self) -> tuple[SweptParameter, ...]:
         """Parameters with their ranges."""
         return self.base.parameters
 
@@ -117,7 +117,7 @@ class DesignStudy(Study[R_co]):
         """Metrics of the objective or targets."""
 
     @abstractmethod
-    def sought(self) -> dict[str, Any]:
+    def goal(self) -> dict[str, Any]:
         """Return the objective or the targets as plain values."""
 
     def design(self, unit: Array) -> tuple[float, ...]:
@@ -139,8 +139,8 @@ class DesignStudy(Study[R_co]):
         """Return everything that the results depend on as plain values, without the limit of evaluations."""
         search = {name: value for name, value in vars(self.search).items() if name != "evaluations"}
         ranges = [[p.low, p.high, p.log] for p in self.parameters]
-        sought = {"objective": None, "targets": []} | self.sought()
-        return self.base.content() | {"ranges": ranges} | sought | {"search": search}
+        goal = {"objective": None, "targets": []} | self.goal()
+        return self.base.content() | {"ranges": ranges} | goal | {"search": search}
 
 
 def base_study(table: StudyTable, folder: FilePath, columns: Mapping[str, str]) -> SweepStudy:
@@ -210,7 +210,7 @@ def _nominal(setting: Setting, place: Place, field: str) -> float:
     return float(value)
 
 
-def _start(setting: Setting, places: tuple[Place, ...], parameter: Varied, given: float | None) -> float:
+def _start(setting: Setting, places: tuple[Place, ...], parameter: SweptParameter, given: float | None) -> float:
     """Return the start of a parameter: that given in the study, else the value in the mechanism's file."""
     field = f"vary.{parameter.name}.start"
     found = {_nominal(setting, place, field) for place in places} if given is None else {given}
@@ -232,12 +232,12 @@ def _start(setting: Setting, places: tuple[Place, ...], parameter: Varied, given
     return _rounded(parameter, start)
 
 
-def _share(parameter: Varied, value: float) -> float:
+def _share(parameter: SweptParameter, value: float) -> float:
     low, high = parameter.ends
     return float(np.log(value / low) / np.log(high / low)) if parameter.log else (value - low) / (high - low)
 
 
-def _rounded(parameter: Varied, value: float) -> float:
+def _rounded(parameter: SweptParameter, value: float) -> float:
     """Round a value to twelve digits, within the bounds, so that equal designs do not differ by rounding."""
     low, high = parameter.ends
     return min(max(float(f"{value:.12g}"), low), high)

@@ -18,7 +18,7 @@ from paraflex.designs.derivatives.gradient import ModeGradients, mode_gradients
 from paraflex.designs.derivatives.plans import check_has_path, nominal_values
 from paraflex.designs.measure import SMOOTH, check_metric, check_smooth, metric_of, smooth_metrics
 from paraflex.designs.run import Task
-from paraflex.designs.samples import Varied
+from paraflex.designs.samples import SweptParameter
 from paraflex.designs.schema import SweepTable, study_table
 from paraflex.designs.setting import Setting, digest, make_setting
 from paraflex.errors import InputError
@@ -184,7 +184,7 @@ class SensitivityStudy(WholeStudy[Sensitivities]):
         Name of the study.
     setting : Setting
         Settings of the runs, with metrics that have derivatives.
-    parameters : tuple of Varied
+    parameters : tuple of SweptParameter
         Parameters to differentiate with respect to.
     at : mapping of str to float
         Parameter values that replace those of the mechanism's file.
@@ -200,17 +200,17 @@ class SensitivityStudy(WholeStudy[Sensitivities]):
     gives: ClassVar[type[Result]] = Sensitivities
     name: str
     setting: Setting
-    parameters: tuple[Varied, ...]
+    parameters: tuple[SweptParameter, ...]
     at: Mapping[str, float] = field(default_factory=dict)
 
     def content(self) -> str:
         """Return a digest of everything that the results depend on."""
         setting = self.setting
         places = [[list(place) for place in places] for places in setting.places]
-        asked = [setting.identity, places, setting.names, setting.paths, setting.modes, setting.metrics]
-        return digest([*asked, dict(self.at)])
+        parts = [setting.identity, places, setting.names, setting.paths, setting.modes, setting.metrics]
+        return digest([*parts, dict(self.at)])
 
-    def _ready(self, workers: Workers | None) -> Callable[[OnProgress | None], Sensitivities]:
+    def _prepare(self, workers: Workers | None) -> Callable[[OnProgress | None], Sensitivities]:
         no_workers(workers, "paths are differentiated one after another")
         return self._run
 
@@ -293,7 +293,7 @@ def _values(setting: Setting, at: Mapping[str, float]) -> tuple[float, ...]:
     )
 
 
-def _size(parameter: Varied, value: float) -> float | None:
+def _size(parameter: SweptParameter, value: float) -> float | None:
     """Return the size from which the step of a parameter with value zero is chosen: its range, or None."""
     if value != 0.0 or parameter.low is None or parameter.high is None:
         return None

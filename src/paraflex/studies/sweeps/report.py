@@ -13,7 +13,7 @@ import xarray as xr
 from paraflex.campaign import LostWorker, Workers, outcomes, tables_of
 from paraflex.compilation import compile_kernels_for
 from paraflex.designs.measure import beyond_limits, coarse_runs
-from paraflex.designs.reopen import StudyFolder, open_study, run_again
+from paraflex.designs.reopen import StudyFolder, open_study, rerun
 from paraflex.designs.schema import DEFAULT_NAME
 from paraflex.errors import InputError, ParaflexError
 from paraflex.figures.designs import DesignTable, read_designs
@@ -24,7 +24,7 @@ from paraflex.formatting import quantity
 from paraflex.report import Page
 from paraflex.report.choice import MOST_RUNS, Picked, best_runs
 from paraflex.report.sweep import StudyAccount, VariedParameter, sweep_page
-from paraflex.results.doubts import doubt_lines
+from paraflex.results.findings import finding_lines
 from paraflex.results.metrics import VALIDITY
 from paraflex.writing import read_json
 
@@ -92,7 +92,7 @@ def _again(
     def again(row: int, watch: Callable[[float], None]) -> tuple[xr.Dataset, bool] | str:
         values, path, mode = designs.values(row), str(designs.path[row]), str(designs.mode[row])
         try:
-            data, metrics = run_again(study.setting, values, path, mode, watch)
+            data, metrics = rerun(study.setting, values, path, mode, watch)
         except ParaflexError as error:
             return " ".join(str(error).split())
         rows = {name: designs.metrics[name][row] for name in metrics if name in designs.metrics}
@@ -141,7 +141,7 @@ def _notes(study: StudyFolder, designs: DesignTable, differ: Sequence[int]) -> l
     notes = []
     if not designs.complete.any():
         notes.append("No run is complete: there is nothing to draw. The reasons are given below.")
-    notes += doubt_lines(study.setting.verdict())
+    notes += finding_lines(study.setting.verdict())
     beyond = int(np.sum(designs.metrics.get(VALIDITY, np.zeros(0)) > 1.0))
     if beyond:
         notes.append(f"{beyond_limits(beyond)}.")

@@ -14,7 +14,7 @@ from paraflex.mechanism.quantities import known
 
 _AXES = ("x", "y", "angle")
 # Fields of loads and displacements; choosing one of them replaces all.
-GIVEN = ("loads", "torques", "moved")
+ACTIONS = ("loads", "torques", "moved")
 STEPS, FACTORS = 10, 1
 # Upper limit of steps; more would show no further detail.
 _MOST_STEPS = 10_000
@@ -96,7 +96,7 @@ class Conditions(NamedTuple):
         return tuple(dict.fromkeys((*self.moved, *self.loads, *self.measured, *self.held)))
 
     @property
-    def words(self) -> str:
+    def description(self) -> str:
         """Displacements and loads in words: "travel of stage.T.x by 0.01 m and -20 N at stage.T.y"."""
         travels = [f"travel of {one.name} by {value:g} {one.unit}" for one, value in self.moved.items()]
         loads = [f"{value:g} {one.effort_unit} at {one.name}" for one, value in self.loads.items()]
@@ -146,11 +146,11 @@ class ModelWithStatics(ModelWithPaths, Protocol):
 
 def chosen_over(own: Mapping[str, Any], chosen: Mapping[str, Any]) -> dict[str, Any]:
     """Replace fields by chosen ones; a chosen load, torque or displacement replaces all of these."""
-    replaced = GIVEN if any(name in chosen for name in GIVEN) else ()
+    replaced = ACTIONS if any(name in chosen for name in ACTIONS) else ()
     return {name: value for name, value in own.items() if name not in replaced} | dict(chosen)
 
 
-def conditions(mechanism: Mechanism, asked: StaticsDefaults) -> Conditions:
+def conditions(mechanism: Mechanism, requested: StaticsDefaults) -> Conditions:
     """Return the conditions on coordinates of a mechanism.
 
     Raises
@@ -158,16 +158,16 @@ def conditions(mechanism: Mechanism, asked: StaticsDefaults) -> Conditions:
     InputError
         Names are unknown, a coordinate is given twice, or numbers are out of range.
     """
-    _counted(asked.steps, 1, _MOST_STEPS, "steps", "steps")
-    _counted(asked.buckling, 0, _MOST_FACTORS, "buckling", "factors")
-    efforts = _efforts(mechanism, asked)
-    travels = {coordinate_named(mechanism, name, f"moved.{name}"): value for name, value in asked.moved.items()}
+    _counted(requested.steps, 1, _MOST_STEPS, "steps", "steps")
+    _counted(requested.buckling, 0, _MOST_FACTORS, "buckling", "factors")
+    efforts = _efforts(mechanism, requested)
+    travels = {coordinate_named(mechanism, name, f"moved.{name}"): value for name, value in requested.moved.items()}
     for one, value in travels.items():
         _finite(value, f"moved.{one.name}", one.unit)
-    held = asked.held
+    held = requested.held
     if held is None:
         given = {one.name for one in (*efforts, *travels)}
-        driven = [motor.joint for motor in mechanism.motors if motor.name not in asked.torques]
+        driven = [motor.joint for motor in mechanism.motors if motor.name not in requested.torques]
         held = tuple(joint for joint in driven if joint not in given)
     kept = tuple(dict.fromkeys(coordinate_named(mechanism, name, "held") for name in held))
     for where, first, second in (("loads", efforts, travels), ("held", kept, travels), ("held", kept, efforts)):
@@ -175,17 +175,17 @@ def conditions(mechanism: Mechanism, asked: StaticsDefaults) -> Conditions:
             if one in second:
                 raise InputError("is given twice: loaded, moved and held exclude one another", field=where,
                                  value=one.name, remedy="leave it out of all but one")  # fmt: skip
-    wanted = [*travels, *efforts] if asked.stiffness is None else [
-        coordinate_named(mechanism, name, "stiffness") for name in asked.stiffness
+    measured = [*travels, *efforts] if requested.stiffness is None else [
+        coordinate_named(mechanism, name, "stiffness") for name in requested.stiffness
     ]  # fmt: skip
-    return Conditions(kept, travels, efforts, tuple(dict.fromkeys(wanted)))
+    return Conditions(kept, travels, efforts, tuple(dict.fromkeys(measured)))
 
 
-def _efforts(mechanism: Mechanism, asked: StaticsDefaults) -> dict[Coordinate, float]:
+def _efforts(mechanism: Mechanism, requested: StaticsDefaults) -> dict[Coordinate, float]:
     """Return forces and torques at coordinates; those of motors act at their joints, and several at a joint add up."""
     joints = {motor.name: motor.joint for motor in mechanism.motors}
     efforts: dict[Coordinate, float] = {}
-    for table, values in (("loads", asked.loads), ("torques", asked.torques)):
+    for table, values in (("loads", requested.loads), ("torques", requested.torques)):
         for name, value in values.items():
             if table == "torques":
                 known(name, list(joints), table, "motor")

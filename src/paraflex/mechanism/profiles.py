@@ -12,7 +12,7 @@ from typing import Protocol, runtime_checkable
 import numpy as np
 import scipy
 
-from paraflex.arguments import CheckedFields, given_as
+from paraflex.arguments import CheckedFields, named_in_errors
 from paraflex.arrays import Array
 from paraflex.errors import InputError
 
@@ -27,9 +27,9 @@ _DEGREE = 5
 _MOST_STOPS = 200
 
 
-@given_as("a law", "a law in time: ConstantSpeed, PiecewiseLaw, TabulatedLaw or SampledAngle")
+@named_in_errors("a profile", "a profile in time: ConstantSpeed, PiecewiseProfile, TabulatedProfile or SampledAngle")
 @runtime_checkable
-class AngleLaw(Protocol):
+class TimeProfile(Protocol):
     """Profile of an angle, a travel, a force or a torque in time."""
 
     def evaluate(self, t: Array) -> tuple[Array, Array, Array]:
@@ -85,7 +85,7 @@ class ConstantSpeed(CheckedFields):
     initial state of a run, which replaces `angle`.
     """
 
-    _table = "law"
+    _table = "profile"
 
     angle: float
     speed: float
@@ -98,12 +98,12 @@ class ConstantSpeed(CheckedFields):
 
 
 @dataclass(frozen=True)
-class PiecewiseLaw(CheckedFields):
+class PiecewiseProfile(CheckedFields):
     """Profile of successive pieces, continuous in value and rate for a prescribed motion; loads and torques may jump.
 
     Attributes
     ----------
-    pieces : tuple of AngleLaw
+    pieces : tuple of TimeProfile
         Pieces in order, each a function of the same absolute time.
     ends : tuple of float
         End times of all pieces but the last, ascending [s].
@@ -114,9 +114,9 @@ class PiecewiseLaw(CheckedFields):
         The end times do not ascend from 0.
     """
 
-    _table = "law"
+    _table = "profile"
 
-    pieces: tuple[AngleLaw, ...]
+    pieces: tuple[TimeProfile, ...]
     ends: tuple[float, ...]
 
     def __post_init__(self) -> None:
@@ -155,7 +155,7 @@ class Interpolation(Enum):
 
 
 @dataclass(frozen=True)
-class TabulatedLaw(CheckedFields):
+class TabulatedProfile(CheckedFields):
     """Profile interpolated from a table, by a quintic spline or, for loads and torques only, by straight lines.
 
     Fewer than six points are interpolated by the polynomial through all of them.
@@ -175,7 +175,7 @@ class TabulatedLaw(CheckedFields):
         There are fewer than two rows, a number is not finite, or the times do not ascend.
     """
 
-    _table = "law"
+    _table = "profile"
 
     times: tuple[float, ...]
     values: tuple[float, ...]
@@ -250,17 +250,17 @@ class TabulatedLaw(CheckedFields):
         return self._spline(x), self._spline(x, 1), self._spline(x, 2)
 
 
-def marks(law: AngleLaw) -> tuple[float, ...]:
+def marks(profile: TimeProfile) -> tuple[float, ...]:
     """Return the times at which a profile may have a peak between samples: its knots and table rows [s]."""
-    return (*law.knots, *getattr(law, "breaks", ()))
+    return (*profile.knots, *getattr(profile, "breaks", ()))
 
 
-def stops(law: AngleLaw) -> tuple[float, ...]:
+def stops(profile: TimeProfile) -> tuple[float, ...]:
     """Return the times at which integration steps end [s]: the `stops` of a profile, by default all its knots."""
-    return getattr(law, "stops", law.knots)
+    return getattr(profile, "stops", profile.knots)
 
 
-def check_motion(law: AngleLaw) -> None:
+def check_motion(profile: TimeProfile) -> None:
     """Check that a profile is suitable for a prescribed motion, in which only the acceleration may jump.
 
     Raises
@@ -268,18 +268,18 @@ def check_motion(law: AngleLaw) -> None:
     InputError
         The profile or its rate jumps between pieces, or it is a linear table.
     """
-    if isinstance(law, TabulatedLaw) and law.linear:
+    if isinstance(profile, TabulatedProfile) and profile.linear:
         raise InputError(
             "the rate of a motion between straight lines jumps", field="interpolation", value="linear",
             remedy='give "spline", or pieces that meet in value and rate',
         )  # fmt: skip
-    if not isinstance(law, PiecewiseLaw):
+    if not isinstance(profile, PiecewiseProfile):
         return
-    for piece in law.pieces:
+    for piece in profile.pieces:
         check_motion(piece)
-    for end, (left, right) in zip(law.ends, pairwise(law.pieces), strict=True):
+    for end, (left, right) in zip(profile.ends, pairwise(profile.pieces), strict=True):
         at = np.array([end])
-        for what, a, b in zip(("law", "rate"), left.evaluate(at), right.evaluate(at), strict=False):
+        for what, a, b in zip(("profile", "rate"), left.evaluate(at), right.evaluate(at), strict=False):
             jump = float(b[0] - a[0])
             if abs(jump) > _SMOOTH * max(1.0, abs(float(a[0]))):
                 raise InputError(

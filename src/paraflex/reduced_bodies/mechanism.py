@@ -21,7 +21,7 @@ from paraflex.dynamics.sparse import stiffness_diagonal
 from paraflex.errors import ActuationError, InputError, SingularActuationError
 from paraflex.mechanism import ActuationMode, Mechanism, mode_of_motors
 from paraflex.motion import MotionRun
-from paraflex.reduction.deflections import PlannedDeflections
+from paraflex.reduced_bodies.deflections import PlannedDeflections
 from paraflex.tracking import TrackingRun, TrackingTask
 
 # Directions with less than this fraction of the largest root of energy are rounding.
@@ -84,7 +84,7 @@ def _along_plan(task: TrackingTask, count: int, modes: Sequence[str | ActuationM
             refused = error
     if refused is not None and not driven:
         raise refused
-    groups = [of_one_energy(task.system, driven), planned.of_end_effector()]
+    groups = [normalised_by_energy(task.system, driven), planned.of_end_effector()]
     return replace(mechanism, bases=bases_of(task.system, groups, count))
 
 
@@ -93,7 +93,7 @@ def _from_runs(runs: Sequence[TrackingRun | MotionRun], count: int) -> Mechanism
     systems = [run.task.system if isinstance(run, TrackingRun) else run.system for run in runs]
     if not systems or any(system.mechanism != systems[0].mechanism for system in systems):
         raise InputError("are not of one mechanism", field="along", remedy="give one or several runs of one")
-    groups = [of_one_energy(systems[0], [run.solution.q for run in runs])]
+    groups = [normalised_by_energy(systems[0], [run.solution.q for run in runs])]
     groups += [PlannedDeflections(run.task).of_end_effector() for run in runs[:1] if isinstance(run, TrackingRun)]
     return replace(systems[0].described, bases=bases_of(systems[0], groups, count))
 
@@ -116,7 +116,7 @@ def bases_of(system: System, deflections: Sequence[Array], count: int) -> dict[s
         The count exceeds the number of flexible coordinates, or of independent directions in the deflections.
     """
     _check(system, count)
-    together = of_one_energy(system, deflections)
+    together = normalised_by_energy(system, deflections)
     found = []
     for body in system.bodies:
         energies = body.modes.omega * together[:, body.flexible]
@@ -149,7 +149,7 @@ def _check(system: System, count: int) -> None:
         )  # fmt: skip
 
 
-def of_one_energy(system: System, parts: Sequence[Array]) -> Array:
+def normalised_by_energy(system: System, parts: Sequence[Array]) -> Array:
     """Scale deflections (k, n) to one unit of strain energy in total, with equal shares of each part (any, n)."""
     stiffness = stiffness_diagonal(system)
     energies = [np.sum(part**2 @ stiffness) for part in parts]

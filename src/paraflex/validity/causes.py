@@ -9,13 +9,13 @@ from paraflex.errors import IntegrationError, SliderOffBeamError
 from paraflex.findings import Finding
 from paraflex.integrators import Solution
 from paraflex.mechanism import Mechanism
-from paraflex.validity.numbers import doubtful_numbers
+from paraflex.validity.numbers import implausible_numbers
 
 # Codes of findings about numbers that make motions impossible; other doubtful numbers do not make a run fail.
 _CODES = ("modulus", "density", "material", "mass", "beam-thin", "beam-thick", "section-turned", "size", "angle")
 
 
-def to_blame(mechanism: Mechanism, text: str = "") -> str:
+def likely_cause(mechanism: Mechanism, text: str = "") -> str:
     """Return the doubtful number that most likely caused an error; empty for none.
 
     Parameters
@@ -25,11 +25,11 @@ def to_blame(mechanism: Mechanism, text: str = "") -> str:
     text : str
         Text of the error: numbers of the bodies it names come first.
     """
-    found = [one for one in doubtful_numbers(mechanism) if one.code in _CODES]
-    return most_likely(found, [body.name for body in mechanism.bodies if f" {body.name} " in f" {text} "])
+    found = [one for one in implausible_numbers(mechanism) if one.code in _CODES]
+    return cause_among(found, [body.name for body in mechanism.bodies if f" {body.name} " in f" {text} "])
 
 
-def most_likely(found: Sequence[Finding], bodies: Sequence[str] = ()) -> str:
+def cause_among(found: Sequence[Finding], bodies: Sequence[str] = ()) -> str:
     """Return the first of the doubtful numbers, those of the named bodies before others; empty for none."""
     of_bodies = [one for one in found if any(f"{one.place}.".startswith(f"body.{name}.") for name in bodies)]
     for one in [*of_bodies, *found]:
@@ -37,9 +37,9 @@ def most_likely(found: Sequence[Finding], bodies: Sequence[str] = ()) -> str:
     return ""
 
 
-def with_blame(error: IntegrationError, mechanism: Mechanism) -> IntegrationError:
+def with_likely_cause(error: IntegrationError, mechanism: Mechanism) -> IntegrationError:
     """Return the error of a failed run, with the most likely doubtful number, if any, as its remedy."""
-    blamed = "" if isinstance(error, SliderOffBeamError) else to_blame(mechanism, error.cause)
+    blamed = "" if isinstance(error, SliderOffBeamError) else likely_cause(mechanism, error.cause)
     if blamed:
         error.remedy = blamed
         if isinstance(error.partial, Solution):

@@ -1,4 +1,4 @@
-"""Prescribed laws of model files: exact derivatives, pieces that meet, tables; and what is refused."""
+"""Prescribed profiles of model files: exact derivatives, pieces that meet, tables; and what is refused."""
 
 import numpy as np
 import pytest
@@ -10,7 +10,7 @@ from paraflex.files import load
 from paraflex.files.expressions import ExpressionError, evaluate_in_time
 from paraflex.integrators import IntegrationOptions
 from paraflex.kernel.signals import evaluate_signal
-from paraflex.mechanism import ConstantSpeed, PiecewiseLaw, TabulatedLaw
+from paraflex.mechanism import ConstantSpeed, PiecewiseProfile, TabulatedProfile
 from paraflex.motion import simulate_motion
 from test_spin_up import acceleration, angle, rate
 
@@ -39,14 +39,14 @@ GYRATION = np.sqrt(0.1 / 2.0 + 0.1**2)
 PARAMETERS = {"a": 0.3, "w": 5.0, "n": 3.0}
 
 
-def write(folder, law, head=""):
+def write(folder, profile, head=""):
     file = folder / "disc.toml"
-    file.write_text(head + DISC + law, encoding="utf-8")
+    file.write_text(head + DISC + profile, encoding="utf-8")
     return file
 
 
-def law_of(folder, text):
-    return load(write(folder, text)).mechanism.prescribed[0].law
+def profile_of(folder, text):
+    return load(write(folder, text)).mechanism.prescribed[0].profile
 
 
 # --- Jets ---------------------------------------------------------------------------------------------------------
@@ -120,7 +120,7 @@ def test_expressions_without_finite_derivatives_are_refused_with_the_time(text, 
     assert says in caught.value.problem
 
 
-# --- Laws from files ----------------------------------------------------------------------------------------------
+# --- Profiles from files ----------------------------------------------------------------------------------------------
 
 
 def test_a_speed_without_an_assembly_is_refused_by_what_needs_one(tmp_path):
@@ -135,17 +135,17 @@ def test_a_speed_without_an_assembly_is_refused_by_what_needs_one(tmp_path):
 
 
 def test_constant_speed_as_ever(tmp_path):
-    assert law_of(tmp_path, "angle = 0.5\nspeed = 3.0") == ConstantSpeed(0.5, 3.0)
-    assert law_of(tmp_path, 'angle = "pi / 2"\nspeed = "w / 2"') == ConstantSpeed(np.pi / 2, 2.5)
-    assert law_of(tmp_path, "speed = 3") == ConstantSpeed(0.0, 3.0)
-    assert law_of(tmp_path, "") == ConstantSpeed(0.0, 0.0)
+    assert profile_of(tmp_path, "angle = 0.5\nspeed = 3.0") == ConstantSpeed(0.5, 3.0)
+    assert profile_of(tmp_path, 'angle = "pi / 2"\nspeed = "w / 2"') == ConstantSpeed(np.pi / 2, 2.5)
+    assert profile_of(tmp_path, "speed = 3") == ConstantSpeed(0.0, 3.0)
+    assert profile_of(tmp_path, "") == ConstantSpeed(0.0, 0.0)
 
 
-def test_pieces_are_the_spin_up_law(tmp_path):
-    law = load("spin_up").mechanism.prescribed[0].law
+def test_pieces_are_the_spin_up_profile(tmp_path):
+    profile = load("spin_up").mechanism.prescribed[0].profile
     t = np.linspace(0.0, 20.0, 801)
-    assert law.knots == (15.0,)
-    for found, expected in zip(law.evaluate(t), (angle, rate, acceleration), strict=True):
+    assert profile.knots == (15.0,)
+    for found, expected in zip(profile.evaluate(t), (angle, rate, acceleration), strict=True):
         np.testing.assert_allclose(found, expected(t, w_s=6.0), rtol=1e-13, atol=1e-13)
 
 
@@ -166,21 +166,21 @@ def test_a_run_follows_an_expression_and_pieces_whose_acceleration_jumps(tmp_pat
 
 def test_a_table_is_a_spline_with_four_continuous_derivatives_and_signals_are_it():
     t = np.sort(np.concatenate([[0.0, 2.0], np.random.default_rng(1).uniform(0.0, 2.0, 60)]))
-    law = TabulatedLaw(tuple(t), tuple(np.sin(3.0 * t)))
+    profile = TabulatedProfile(tuple(t), tuple(np.sin(3.0 * t)))
     fine = np.linspace(0.05, 1.95, 1001)
     for found, expected, within in zip(
-        law.evaluate(fine), (np.sin(3 * fine), 3 * np.cos(3 * fine), -9 * np.sin(3 * fine)), (1e-5, 1e-3, 5e-2),
+        profile.evaluate(fine), (np.sin(3 * fine), 3 * np.cos(3 * fine), -9 * np.sin(3 * fine)), (1e-5, 1e-3, 5e-2),
         strict=True,
     ):  # fmt: skip
         np.testing.assert_allclose(found, expected, rtol=0, atol=within)
-    pieces = scipy.interpolate.PPoly.from_spline(law._spline)
+    pieces = scipy.interpolate.PPoly.from_spline(profile._spline)
     for order in range(5):
         left, right = pieces.derivative(order)(t[3:-3] - 1e-9), pieces.derivative(order)(t[3:-3] + 1e-9)
         np.testing.assert_allclose(left, right, rtol=0, atol=1e-4)
 
 
 def test_signals_of_a_table_reproduce_it_between_its_rows(tmp_path):
-    """Denser rows than a law is sampled at otherwise, and a run that ends between two of them."""
+    """Denser rows than a profile is sampled at otherwise, and a run that ends between two of them."""
     t = np.linspace(0.0, 1.0, 5001)
     rows = np.column_stack([t, 0.2 * np.sin(40.0 * t)])
     np.savetxt(tmp_path / "motion.csv", rows, delimiter=",", header="time, angle", comments="")
@@ -190,7 +190,7 @@ def test_signals_of_a_table_reproduce_it_between_its_rows(tmp_path):
     times = np.random.default_rng(2).uniform(0.0, 0.73333, 200)
     found = np.array([evaluate_signal(signals, 0, time) for time in times])
     for column, expected, within in zip(
-        found.T, mechanism.prescribed[0].law.evaluate(times), (1e-13, 1e-11, 1e-7), strict=True
+        found.T, mechanism.prescribed[0].profile.evaluate(times), (1e-13, 1e-11, 1e-7), strict=True
     ):
         np.testing.assert_allclose(column, expected, rtol=0, atol=within)
 
@@ -198,8 +198,8 @@ def test_signals_of_a_table_reproduce_it_between_its_rows(tmp_path):
 @pytest.mark.parametrize("count", [2, 3, 4, 5, 6])
 def test_few_rows_are_passed_by_the_polynomial_through_them(count):
     t = np.linspace(0.0, 1.0, count)
-    law = TabulatedLaw(tuple(t), tuple(t ** (count - 1)))
-    value, first, second = law.evaluate(np.array([0.3]))
+    profile = TabulatedProfile(tuple(t), tuple(t ** (count - 1)))
+    value, first, second = profile.evaluate(np.array([0.3]))
     n = count - 1
     assert value[0] == pytest.approx(0.3**n)
     assert first[0] == pytest.approx(n * 0.3 ** (n - 1))
@@ -222,7 +222,7 @@ def test_tables_from_files_of_many_a_form(tmp_path, monkeypatch, content):
     # The name is relative to the model, wherever one works.
     monkeypatch.chdir(tmp_path / "far")
     model = load(file)
-    assert model.mechanism.prescribed[0].law == TabulatedLaw((0.0, 1.0, 2.0), (0.0, 2.0, 5.0))
+    assert model.mechanism.prescribed[0].profile == TabulatedProfile((0.0, 1.0, 2.0), (0.0, 2.0, 5.0))
     # Provenance has the rows and not the name of a file that may change.
     assert model.parameters["prescribed"]["drive"]["table"] == [[0.0, 0.0], [1.0, 2.0], [2.0, 5.0]]
 
@@ -237,7 +237,7 @@ def test_a_run_longer_than_its_table_is_refused_with_both_times(tmp_path):
     )
 
 
-def test_a_law_is_asked_only_for_the_times_of_the_run(tmp_path):
+def test_a_profile_is_asked_only_for_the_times_of_the_run(tmp_path):
     """This one ends at 0.6 s; a start at 0 s must not look beyond."""
     mechanism = load(write(tmp_path, 'angle = "sqrt(0.6 - t)"')).mechanism
     simulate_motion(mechanism, 0.5, samples=3)
@@ -246,9 +246,9 @@ def test_a_law_is_asked_only_for_the_times_of_the_run(tmp_path):
 
 
 def test_pieces_may_be_nested_and_name_all_knots():
-    inner = PiecewiseLaw((ConstantSpeed(0.0, 1.0), ConstantSpeed(0.0, 1.0)), (2.0,))
-    assert PiecewiseLaw((inner, ConstantSpeed(0.0, 1.0)), (3.0,)).knots == (2.0, 3.0)
-    assert PiecewiseLaw((inner, ConstantSpeed(0.0, 1.0)), (1.0,)).knots == (1.0,)
+    inner = PiecewiseProfile((ConstantSpeed(0.0, 1.0), ConstantSpeed(0.0, 1.0)), (2.0,))
+    assert PiecewiseProfile((inner, ConstantSpeed(0.0, 1.0)), (3.0,)).knots == (2.0, 3.0)
+    assert PiecewiseProfile((inner, ConstantSpeed(0.0, 1.0)), (1.0,)).knots == (1.0,)
 
 
 STUDY = "[study]\nduration = 2.0\n"
@@ -262,20 +262,20 @@ STUDY = "[study]\nduration = 2.0\n"
         ("angle = [1.0]", "prescribed.drive.angle: neither a number nor an expression (got [1.0])"),
         ("angle = true", "prescribed.drive.angle: neither a number nor an expression (got True)"),
         ('angle = "t"\nspeed = 1.0', "prescribed.drive.speed: a speed can only be added to"),
-        ('angle = "t"\ntable = [[0, 0], [1, 1]]', "prescribed.drive.table: a law is given in two ways"),
+        ('angle = "t"\ntable = [[0, 0], [1, 1]]', "prescribed.drive.table: a profile is given in two ways"),
         ("displacement = 1.0", "prescribed.drive.displacement: a revolute joint has no displacement (got 'O')"),
         ('angle = "1 / (1 - t)"\n' + STUDY, "prescribed.drive.angle: its value is not a finite number at t = 1 s"),
         ('pieces = []', "prescribed.drive.pieces: list should have at least 1 item"),
         ('pieces = [{ angle = "t" }, { angle = "t" }]', "prescribed.drive.pieces.0.until: every piece but the last"),
         ('pieces = [{ until = 1, angle = "t" }]', "prescribed.drive.pieces.0.until: every piece but the last has an"),
-        ("pieces = [{ until = 1 }, { angle = 1 }]", "prescribed.drive.pieces.0: a piece needs one law"),
+        ("pieces = [{ until = 1 }, { angle = 1 }]", "prescribed.drive.pieces.0: a piece needs one profile"),
         (
             'pieces = [{ until = 1, angle = "t" }, { until = 1, angle = "t" }, { angle = "t" }]',
             "prescribed.drive.pieces: the times of pieces must ascend from 0 (got 1.0)",
         ),
         (
             'pieces = [{ until = 2, angle = "t" }, { angle = "t - 1" }]',
-            "prescribed.drive.pieces: the law jumps by -1 at t = 2 s (got '2 before, 1 after')",
+            "prescribed.drive.pieces: the profile jumps by -1 at t = 2 s (got '2 before, 1 after')",
         ),
         (
             'pieces = [{ until = 2, angle = "t ** 2" }, { angle = "4 + 3.5 * (t - 2)" }]',
@@ -296,7 +296,7 @@ STUDY = "[study]\nduration = 2.0\n"
         ('table = "wide.csv"', "prescribed.drive.table: line 1 of wide.csv is not two numbers (got '0,1,2')"),
     ],
 )  # fmt: skip
-def test_laws_that_make_no_sense_are_refused_by_name(tmp_path, text, says):
+def test_profiles_that_make_no_sense_are_refused_by_name(tmp_path, text, says):
     (tmp_path / "odd.csv").write_text("t;angle\n0;1\n1;2;3\n")
     (tmp_path / "binary.csv").write_bytes(b"\xff\xfe\x00\x01")
     (tmp_path / "heads.csv").write_text("time, angle\nin s, in rad\n0, 1\n")

@@ -99,7 +99,7 @@ class _Structure:
         self._little = _FREE * typical_square(self.elastic, stiffness, self.mass) * self.mass
         self._saddle = Saddle(scipy.sparse.csr_matrix(stiffness + self._little), sparse_jacobian(system, q))
 
-    def bent(self, force: Array) -> Array:
+    def static_displacements(self, force: Array) -> Array:
         """Return static displacements (n,) under forces (n,) that the inertia of free motions balances."""
         # Under unbalanced forces nearly all of this is free motion, whose inertia holds the mechanism in place.
         moved = self._saddle.solve(force)[0]
@@ -110,9 +110,11 @@ def _ritz_vectors(loaded: Iterable[tuple[_Structure, Array]]) -> Array:
     """Return static displacements under forces, then under their own inertia, scaled to the same size (2 k, n)."""
     first, second = [], []
     for structure, force in loaded:
-        x = structure.bent(force)
+        x = structure.static_displacements(force)
         inertia = structure.mass @ x
         moving = x @ inertia
         first.append(x)
-        second.append((x**2 @ structure.elastic / moving if moving > 0.0 else 0.0) * structure.bent(inertia))
+        second.append(
+            (x**2 @ structure.elastic / moving if moving > 0.0 else 0.0) * structure.static_displacements(inertia)
+        )
     return np.array(first + second)

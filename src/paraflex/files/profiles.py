@@ -19,16 +19,16 @@ from paraflex.files.expressions import (
     names_in,
 )
 from paraflex.files.schema import PieceTable, PrescribedTable
-from paraflex.mechanism import AngleLaw, ConstantSpeed, PiecewiseLaw, TabulatedLaw
-from paraflex.mechanism.laws import Interpolation, Values
+from paraflex.mechanism import ConstantSpeed, PiecewiseProfile, TabulatedProfile, TimeProfile
 from paraflex.mechanism.loads import InTime
+from paraflex.mechanism.profiles import Interpolation, Values
 
 # Number of times at which a profile is evaluated as a check when it is read.
 _TRIALS = 257
 
 
 @dataclass(frozen=True)
-class ExpressionLaw:
+class ExpressionProfile:
     """Profile given by an expression of the time t and of parameters, with exact derivatives.
 
     Attributes
@@ -56,8 +56,8 @@ class ExpressionLaw:
     def __post_init__(self) -> None:
         with expressed_in(self.field, self.text):
             check_in_time(self.text, self.parameters)
-        spoken_of = names_in(self.text)
-        used = {name: value for name, value in self.parameters.items() if name in spoken_of}
+        occurring = names_in(self.text)
+        used = {name: value for name, value in self.parameters.items() if name in occurring}
         object.__setattr__(self, "parameters", used)
 
     def evaluate(self, t: Array) -> Values:
@@ -73,7 +73,7 @@ class ExpressionLaw:
         return jet.value, jet.rate, jet.acceleration
 
 
-def read_law(entry: PrescribedTable, parameters: Mapping[str, float], duration: float | None) -> AngleLaw:
+def read_profile(entry: PrescribedTable, parameters: Mapping[str, float], duration: float | None) -> TimeProfile:
     """Read the profile of a [prescribed.NAME] table, and evaluate it over the duration of the study as a check.
 
     Parameters
@@ -94,33 +94,33 @@ def read_law(entry: PrescribedTable, parameters: Mapping[str, float], duration: 
     given = [name for name in ("angle", "displacement", "pieces", "table") if getattr(entry, name) is not None]
     if len(given) > 1:
         raise InputError(
-            "a law is given in two ways", field=given[-1], value=", ".join(given), remedy=f"drop all but {given[0]}"
+            "a profile is given in two ways", field=given[-1], value=", ".join(given), remedy=f"drop all but {given[0]}"
         )
-    law = _law(entry, parameters)
-    if entry.speed is not None and not isinstance(law, ConstantSpeed):
+    profile = _profile(entry, parameters)
+    if entry.speed is not None and not isinstance(profile, ConstantSpeed):
         raise InputError(
             "a speed can only be added to an angle or displacement that is a number",
             field="speed",
             value=entry.speed,
-            remedy="write it into the law",
+            remedy="write it into the profile",
         )
-    _try(law, duration)
-    return law
+    _try(profile, duration)
+    return profile
 
 
-def _try(law: AngleLaw, duration: float | None) -> None:
+def _try(profile: TimeProfile, duration: float | None) -> None:
     """Evaluate a profile over the duration of the study, or at t = 0 if it has none."""
     # An invalid duration is reported when the study is checked.
-    law.evaluate(np.linspace(0.0, duration, _TRIALS) if duration is not None and duration > 0.0 else np.zeros(1))
+    profile.evaluate(np.linspace(0.0, duration, _TRIALS) if duration is not None and duration > 0.0 else np.zeros(1))
 
 
 def quantities(entry: PrescribedTable) -> set[str]:
     """Return which of "angle" and "displacement" occur in a [prescribed.NAME] table."""
-    said: list[PrescribedTable | PieceTable] = [entry, *(entry.pieces or [])]
-    return {name for table in said for name in ("angle", "displacement") if getattr(table, name) is not None}
+    tables: list[PrescribedTable | PieceTable] = [entry, *(entry.pieces or [])]
+    return {name for table in tables for name in ("angle", "displacement") if getattr(table, name) is not None}
 
 
-def law_table(law: AngleLaw, quantity: str) -> dict[str, Any]:
+def profile_table(profile: TimeProfile, quantity: str) -> dict[str, Any]:
     """Build the fields of a [prescribed.NAME] table for the profile of an "angle" or a "displacement".
 
     Raises
@@ -128,24 +128,24 @@ def law_table(law: AngleLaw, quantity: str) -> dict[str, Any]:
     InputError
         Profile that cannot be expressed in a file.
     """
-    match law:
+    match profile:
         case ConstantSpeed(angle=angle, speed=speed, knots=()):
-            return ({} if law.from_assembly else {quantity: angle}) | ({"speed": speed} if speed else {})
-        case ExpressionLaw(text=text, knots=()):
+            return ({} if profile.from_assembly else {quantity: angle}) | ({"speed": speed} if speed else {})
+        case ExpressionProfile(text=text, knots=()):
             return {quantity: text}
-        case TabulatedLaw(times=times, values=values):
+        case TabulatedProfile(times=times, values=values):
             return {"table": list(zip(times, values, strict=True))}
-        case PiecewiseLaw(pieces=pieces, ends=ends):
+        case PiecewiseProfile(pieces=pieces, ends=ends):
             last = {quantity: _piece(pieces[-1])}
             before = zip(ends, pieces, strict=False)
             return {"pieces": [*({"until": end, quantity: _piece(piece)} for end, piece in before), last]}
-    raise _no_words(law)
+    raise _inexpressible_profile(profile)
 
 
 def read_components(
     entry: Any, quantity: str, parameters: Mapping[str, float], duration: float | None
 ) -> tuple[InTime, ...]:
-    """Read the two components of a "force", or the one of a "torque", and check profiles as `read_law` does.
+    """Read the two components of a "force", or the one of a "torque", and check profiles as `read_profile` does.
 
     Parameters
     ----------
@@ -162,7 +162,7 @@ def read_components(
     Raises
     ------
     InputError
-        Invalid profile; see `read_law`.
+        Invalid profile; see `read_profile`.
     """
     given = [name for name in (quantity, "pieces", "table") if getattr(entry, name) is not None]
     if len(given) != 1:
@@ -178,40 +178,41 @@ def read_components(
     if entry.table is not None:
         times, *columns = zip(*entry.table, strict=True) if entry.table else ((), ())
         kind = Interpolation(entry.interpolation or Interpolation.SPLINE)
-        found = [TabulatedLaw(times, column, kind) for column in columns]
-        components = tuple(law.values[0] if len(set(law.values)) == 1 else law for law in found)
+        found = [TabulatedProfile(times, column, kind) for column in columns]
+        components = tuple(profile.values[0] if len(set(profile.values)) == 1 else profile for profile in found)
     elif entry.pieces is not None:
         ends = _ends(entry.pieces)
         rows = [
             _functions(getattr(piece, quantity), parameters, f"pieces.{k}.{quantity}")
             for k, piece in enumerate(entry.pieces)
         ]
-        components = tuple(_joined(laws, ends) for laws in zip(*rows, strict=True))
+        components = tuple(_joined(profiles, ends) for profiles in zip(*rows, strict=True))
     else:
         components = _functions(getattr(entry, quantity), parameters, quantity)
-    for law in components:
-        if isinstance(law, AngleLaw):
-            _try(law, duration)
+    for profile in components:
+        if isinstance(profile, TimeProfile):
+            _try(profile, duration)
     return components
 
 
 def _functions(given: Any, parameters: Mapping[str, float], field: str) -> tuple[InTime, ...]:
     """Read the numbers and expressions of one quantity; expressions that do not contain the time become numbers."""
     listed = isinstance(given, list)
-    laws = [
+    profiles = [
         _expression(each, parameters, f"{field}.{k}" if listed else field)
         for k, each in enumerate(given if listed else [given])
     ]
-    return tuple(law.angle if isinstance(law, ConstantSpeed) else law for law in laws)
+    return tuple(profile.angle if isinstance(profile, ConstantSpeed) else profile for profile in profiles)
 
 
-def _joined(laws: Sequence[InTime], ends: list[float]) -> InTime:
+def _joined(profiles: Sequence[InTime], ends: list[float]) -> InTime:
     """Join pieces to one profile, or to a number if all pieces are the same number."""
-    first = laws[0]
-    if not isinstance(first, AngleLaw) and all(law == first for law in laws):
+    first = profiles[0]
+    if not isinstance(first, TimeProfile) and all(profile == first for profile in profiles):
         return first
-    return PiecewiseLaw(
-        tuple(law if isinstance(law, AngleLaw) else ConstantSpeed(law, 0.0) for law in laws), tuple(ends)
+    return PiecewiseProfile(
+        tuple(profile if isinstance(profile, TimeProfile) else ConstantSpeed(profile, 0.0) for profile in profiles),
+        tuple(ends),
     )
 
 
@@ -224,30 +225,32 @@ def components_table(components: Sequence[InTime], quantity: str) -> dict[str, A
         Profiles that cannot be expressed in a file, or components with different pieces or times.
     """
 
-    def said(values: Sequence[Any]) -> Any:
+    def in_file(values: Sequence[Any]) -> Any:
         return list(values) if quantity == "force" else values[0]
 
-    tables = [law for law in components if isinstance(law, TabulatedLaw)]
-    pieces = [law for law in components if isinstance(law, PiecewiseLaw)]
+    tables = [profile for profile in components if isinstance(profile, TabulatedProfile)]
+    pieces = [profile for profile in components if isinstance(profile, PiecewiseProfile)]
     if tables:
         times, kind = tables[0].times, tables[0].interpolation
         columns = [
-            law.values if isinstance(law, TabulatedLaw) else (law,) * len(times)
-            for law in components
-            if not isinstance(law, AngleLaw)
-            or (isinstance(law, TabulatedLaw) and (law.times, law.interpolation) == (times, kind))
+            profile.values if isinstance(profile, TabulatedProfile) else (profile,) * len(times)
+            for profile in components
+            if not isinstance(profile, TimeProfile)
+            or (isinstance(profile, TabulatedProfile) and (profile.times, profile.interpolation) == (times, kind))
         ]
         if len(columns) < len(components):
             raise _unlike(components)
         table = {"table": [[*row] for row in zip(times, *columns, strict=True)]}
         return table | ({"interpolation": kind.value} if tables[0].linear else {})
     if not pieces:
-        return {quantity: said([_piece(law) for law in components])}
+        return {quantity: in_file([_piece(profile) for profile in components])}
     ends = pieces[0].ends
-    if any(law.ends != ends for law in pieces):
+    if any(profile.ends != ends for profile in pieces):
         raise _unlike(components)
     rows = [
-        said([_piece(law.pieces[k] if isinstance(law, PiecewiseLaw) else law) for law in components])
+        in_file(
+            [_piece(profile.pieces[k] if isinstance(profile, PiecewiseProfile) else profile) for profile in components]
+        )
         for k in range(len(ends) + 1)
     ]
     return {
@@ -255,7 +258,7 @@ def components_table(components: Sequence[InTime], quantity: str) -> dict[str, A
     }
 
 
-def law_parameters(laws: Iterable[tuple[str, AngleLaw]]) -> dict[str, float]:
+def profile_parameters(profiles: Iterable[tuple[str, TimeProfile]]) -> dict[str, float]:
     """Collect the parameters of profiles, each given with its field in a file.
 
     Raises
@@ -264,46 +267,48 @@ def law_parameters(laws: Iterable[tuple[str, AngleLaw]]) -> dict[str, float]:
         Parameter with different values in two profiles.
     """
     found: dict[str, float] = {}
-    for place, whole in laws:
-        for law in whole.pieces if isinstance(whole, PiecewiseLaw) else (whole,):
-            for name, value in law.parameters.items() if isinstance(law, ExpressionLaw) else ():
+    for place, whole in profiles:
+        for profile in whole.pieces if isinstance(whole, PiecewiseProfile) else (whole,):
+            for name, value in profile.parameters.items() if isinstance(profile, ExpressionProfile) else ():
                 if found.setdefault(name, value) != value:
                     raise InputError(
-                        f'a file has one value of the parameter "{name}", and laws have {found[name]!r} and {value!r}',
+                        f'a file has one value of the parameter "{name}", but profiles have {found[name]!r}, {value!r}',
                         field=place, remedy="rename one of them",
                     )  # fmt: skip
     return found
 
 
-def _piece(law: InTime) -> float | str:
-    if not isinstance(law, AngleLaw):
-        return float(law)
-    if isinstance(law, ExpressionLaw):
-        return law.text
-    if isinstance(law, ConstantSpeed):
-        return float(law.angle) if law.speed == 0.0 else f"{float(law.angle)!r} + {float(law.speed)!r} * t"
-    raise _no_words(law)
+def _piece(profile: InTime) -> float | str:
+    if not isinstance(profile, TimeProfile):
+        return float(profile)
+    if isinstance(profile, ExpressionProfile):
+        return profile.text
+    if isinstance(profile, ConstantSpeed):
+        return (
+            float(profile.angle) if profile.speed == 0.0 else f"{float(profile.angle)!r} + {float(profile.speed)!r} * t"
+        )
+    raise _inexpressible_profile(profile)
 
 
-def _no_words(law: AngleLaw) -> InputError:
+def _inexpressible_profile(profile: TimeProfile) -> InputError:
     return InputError(
-        "a model file cannot express this law", field="law", value=type(law).__name__,
-        remedy="give a ConstantSpeed, an ExpressionLaw, a PiecewiseLaw of these, or a TabulatedLaw of its values",
+        "a model file cannot express this profile", field="profile", value=type(profile).__name__,
+        remedy="give a ConstantSpeed, ExpressionProfile, PiecewiseProfile of these, or TabulatedProfile of its values",
     )  # fmt: skip
 
 
 def _unlike(components: Sequence[InTime]) -> InputError:
     return InputError(
         "a model file cannot express a force whose components change at different times",
-        field="force", value=", ".join(type(law).__name__ for law in components),
+        field="force", value=", ".join(type(profile).__name__ for profile in components),
         remedy="give both pieces with the same ends, or tables of the same times and interpolation",
     )  # fmt: skip
 
 
-def _law(entry: PrescribedTable, parameters: Mapping[str, float]) -> AngleLaw:
+def _profile(entry: PrescribedTable, parameters: Mapping[str, float]) -> TimeProfile:
     if entry.table is not None:
         times, values = zip(*entry.table, strict=True) if entry.table else ((), ())
-        return TabulatedLaw(times, values)
+        return TabulatedProfile(times, values)
     if entry.pieces is not None:
         return _pieces(entry.pieces, parameters)
     field, given = _place(entry)
@@ -317,20 +322,20 @@ def _place(table: PrescribedTable | PieceTable) -> tuple[str, Any]:
     return ("angle", table.angle) if table.displacement is None else ("displacement", table.displacement)
 
 
-def _pieces(pieces: list[PieceTable], parameters: Mapping[str, float]) -> PiecewiseLaw:
-    laws = []
+def _pieces(pieces: list[PieceTable], parameters: Mapping[str, float]) -> PiecewiseProfile:
+    profiles = []
     for number, piece in enumerate(pieces):
         field = f"pieces.{number}"
         if (piece.angle is None) == (piece.displacement is None):
             raise InputError(
-                "a piece needs one law, an angle or a displacement",
+                "a piece needs one profile, an angle or a displacement",
                 field=field,
                 remedy="give its angle, or its displacement where the joint slides",
             )
         name, given = _place(piece)
         assert given is not None
-        laws.append(_expression(given, parameters, f"{field}.{name}"))
-    return PiecewiseLaw(tuple(laws), tuple(_ends(pieces)))
+        profiles.append(_expression(given, parameters, f"{field}.{name}"))
+    return PiecewiseProfile(tuple(profiles), tuple(_ends(pieces)))
 
 
 def _ends(pieces: Sequence[Any]) -> list[float]:
@@ -344,10 +349,10 @@ def _ends(pieces: Sequence[Any]) -> list[float]:
     return [piece.until for piece in pieces[:-1]]
 
 
-def _expression(given: float | str, parameters: Mapping[str, float], field: str, speed: float = 0.0) -> AngleLaw:
+def _expression(given: float | str, parameters: Mapping[str, float], field: str, speed: float = 0.0) -> TimeProfile:
     if not isinstance(given, str):
         return ConstantSpeed(given, speed)
     if is_constant(given):
         with expressed_in(field, given):
             return ConstantSpeed(evaluate(given, parameters), speed)
-    return ExpressionLaw(given, parameters, field)
+    return ExpressionProfile(given, parameters, field)

@@ -33,7 +33,7 @@ def verdict_of(data: xr.Dataset) -> Verdict:
     return Verdict(map(Finding.from_dict, json.loads(data.attrs.get(FINDINGS, "[]"))))
 
 
-def doubt_lines(verdict: Iterable[Finding]) -> list[str]:
+def finding_lines(verdict: Iterable[Finding]) -> list[str]:
     """Return a line for each finding; after the first, all modes with the same code share one line."""
     lines, further = [], {}
     for one in verdict:

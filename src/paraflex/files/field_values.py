@@ -9,7 +9,7 @@ from typing import Any
 from paraflex.errors import InputError
 
 
-def fields_said(given: Any, *left_out: str) -> dict[str, Any]:
+def changed_fields(given: Any, *left_out: str) -> dict[str, Any]:
     """Return the fields of a dataclass that differ from their defaults, without those in `left_out`."""
     out = {}
     for field in fields(given):
@@ -53,6 +53,6 @@ def check_fields(
             raise InputError("is missing", field=f"{place}.{key}", remedy=f"give {described(each)}")
 
 
-def unsayable(field: str, value: object, remedy: str) -> InputError:
+def inexpressible(field: str, value: object, remedy: str) -> InputError:
     """Return the error for a part of a model that cannot be expressed in a file."""
     return InputError("a model file cannot express this", field=field, value=value, remedy=remedy)

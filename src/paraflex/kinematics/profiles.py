@@ -11,7 +11,7 @@ from paraflex.arrays import Array
 
 
 @dataclass(frozen=True)
-class TrapezoidalLaw:
+class TrapezoidalProfile:
     """Sine-shaped acceleration, cruise and sine-shaped deceleration, each of half a period T.
 
     The acceleration is a_max sin(2 pi t/T) on [0, T/2), zero on [T/2, T), -a_max sin(2 pi t/T) on [T, 3T/2] with T =
@@ -57,7 +57,7 @@ class TrapezoidalLaw:
 
 
 @dataclass(frozen=True)
-class CruiseLaw:
+class CruiseProfile:
     """Sine-shaped acceleration to a speed, cruise, sine-shaped deceleration: a trapezoidal speed profile without jumps.
 
     With the acceleration a sin(pi t/R) on [0, R] the speed 2 a R/pi is reached. R is such that this is the largest

@@ -9,7 +9,7 @@ from paraflex.errors import InputError
 from paraflex.files import StudyDefaults
 from paraflex.mechanism import ActuationMode, Mechanism
 from paraflex.motion import MotionRun
-from paraflex.reduction import reduced_mechanism
+from paraflex.reduced_bodies import reduced_mechanism
 from paraflex.tracking import TrackingTask
 
 
@@ -20,7 +20,7 @@ def kept_coordinates(request: RunRequest, study: StudyDefaults) -> int | None:
     return (study.reduced if request.reduced is None else request.reduced) or None
 
 
-def asked_reduction(
+def reduced_as_requested(
     request: RunRequest, along: TrackingTask | MotionRun, count: int, modes: Sequence[ActuationMode] | None = None
 ) -> Mechanism:
     """Return the mechanism reduced to `count` coordinates along a plan or a run; errors name the option or field."""

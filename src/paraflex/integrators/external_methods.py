@@ -8,7 +8,7 @@ from typing import ClassVar
 from paraflex.integrators.method import EQUATIONS_INDEX_1, EQUATIONS_ODE, Family, Method, Treatment, parameter
 
 
-class Guest(Method):
+class ExternalMethod(Method):
     """Method run by an external solver.
 
     Attributes
@@ -27,7 +27,7 @@ class Guest(Method):
     solver: ClassVar[str]
 
 
-class SciPyMethod(Guest):
+class SciPyMethod(ExternalMethod):
     """Method of `scipy.integrate`.
 
     Attributes
@@ -79,7 +79,7 @@ class NDF(SciPyMethod):
     multistep = True
 
 
-class SundialsMethod(Guest):
+class SundialsMethod(ExternalMethod):
     """Method of SUNDIALS, with variable order."""
 
     family = Family.SUNDIALS

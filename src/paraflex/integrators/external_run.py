@@ -11,8 +11,8 @@ import scipy
 from paraflex.arrays import Array
 from paraflex.errors import InputError, StiffnessWarning
 from paraflex.findings import Finding, warn_of
+from paraflex.integrators.external_methods import IDA, ExternalMethod, SciPyMethod
 from paraflex.integrators.forms import DescriptorForm, OdeForm, StabilisedForm
-from paraflex.integrators.guests import IDA, Guest, SciPyMethod
 from paraflex.integrators.method import Method, Treatment
 from paraflex.integrators.options import IntegrationOptions
 from paraflex.integrators.run import FIRST_STEP, Figures, Instant, Problem, empty_samples
@@ -35,7 +35,7 @@ MANY_STEPS = 20_000
 _MOST_DENSE = 600
 
 
-class OutsideRun:
+class ExternalRun:
     """Run by an external solver: a `Run`."""
 
     def __init__(self, problem: Problem, options: IntegrationOptions, stepper: Stepper) -> None:
@@ -130,8 +130,8 @@ class OutsideRun:
         solved = stepper.form.solve(stepper.t, q, v)
         if solved.dependent > self.dependent_rows:
             # Adjacent steps form one interval of a singular position.
-            goes_on = self._passages and before <= self._passages[-1][1]
-            self._passages.append((self._passages.pop()[0] if goes_on else before, stepper.t))
+            can_continue = self._passages and before <= self._passages[-1][1]
+            self._passages.append((self._passages.pop()[0] if can_continue else before, stepper.t))
         self._instant = Instant(stepper.t, q, v, solved.a, solved.multipliers, work)
         self._note(self._instant)
         times = self.samples.times
@@ -162,7 +162,7 @@ class OutsideRun:
         self.reached = i + 1
 
 
-def prepare(problem: Problem, options: IntegrationOptions) -> OutsideRun:
+def prepare(problem: Problem, options: IntegrationOptions) -> ExternalRun:
     """Prepare a run.
 
     Raises
@@ -176,12 +176,12 @@ def prepare(problem: Problem, options: IntegrationOptions) -> OutsideRun:
             field="automatic_gains", value=True,
             remedy="give alpha and beta, or choose another method",
         )  # fmt: skip
-    return OutsideRun(problem, options, _stepper(problem, options))
+    return ExternalRun(problem, options, _stepper(problem, options))
 
 
 def _stepper(problem: Problem, options: IntegrationOptions) -> Stepper:
     method = options.method
-    assert isinstance(method, Guest)
+    assert isinstance(method, ExternalMethod)
     tolerance = options.tolerance_for(problem.system)
     error = method.error_factor * tolerance
     if method.multistep:

@@ -10,13 +10,13 @@ from paraflex.control.design.sampled import SampledPlant
 from paraflex.errors import InputError
 
 # Poles further inside the unit circle than this decay without control.
-_LASTING = 1e-9
+_ON_CIRCLE = 1e-9
 # Least singular value of the balanced [A - z, B] below which a motion is not reached.
-_NOT_REACHED = 1e-11
+_UNCONTROLLABLE = 1e-11
 _NAMED = 4
 
 
-def check_reach(
+def check_controllable(
     plant: SampledPlant, columns: Array, field: str, problem: str, remedy: str, *, transposed: bool = False
 ) -> None:
     """Check that given columns reach all motions that do not decay (Hautus test).
@@ -50,10 +50,10 @@ def check_reach(
     columns = columns / max(float(np.linalg.norm(columns)), np.finfo(float).tiny)
     missed = []
     for z in plant.poles:
-        if abs(z) < 1.0 - _LASTING or z.imag < 0.0:
+        if abs(z) < 1.0 - _ON_CIRCLE or z.imag < 0.0:
             continue
         least = np.linalg.svd(np.hstack([A - z * np.eye(len(A)), columns]), compute_uv=False)[-1]
-        if least < _NOT_REACHED:
+        if least < _UNCONTROLLABLE:
             missed.append(frequency_of(complex(z), plant.period))
     if missed:
         names = sorted({"free motion (0 Hz)" if hertz < 1e-4 / plant.period else f"{hertz:.4g} Hz" for hertz in missed})

@@ -20,7 +20,7 @@ from paraflex.mechanism import AppliedTorque, Mechanism, PointRef, RigidBody, gr
 _MISSED = 0.05
 
 
-class MissedTurn(NamedTuple):
+class MissingRotation(NamedTuple):
     """A point of a reduced body whose rotation under a moment is too small.
 
     Attributes
@@ -41,12 +41,12 @@ class MissedTurn(NamedTuple):
     part: float
 
 
-def missed_turns(system: System) -> list[MissedTurn]:
+def missing_rotations(system: System) -> list[MissingRotation]:
     """Return the points at which reduced bodies rotate over five per cent too little under a moment, body by body.
 
     Bases chosen for a motion (`Mechanism.bases`) are not examined: their runs show their error.
     """
-    found: dict[PointRef, MissedTurn] = {}
+    found: dict[PointRef, MissingRotation] = {}
     for point, cause in _moments(system.mechanism):
         described = system.mechanism.body(point.body)
         body = system.body(point.body)
@@ -61,7 +61,7 @@ def missed_turns(system: System) -> list[MissedTurn]:
             continue
         part = _missed(body, system, point)
         if part > _MISSED:
-            found[point] = MissedTurn(point, cause, body.nf, part)
+            found[point] = MissingRotation(point, cause, body.nf, part)
     return sorted(found.values(), key=lambda one: system.index[one.point.body])
 
 
@@ -85,7 +85,7 @@ def _moments(mechanism: Mechanism) -> Iterator[tuple[PointRef, str]]:
         if "angle" in joint.holds
     ]
     causes += [
-        (f"the {group.word} {one.name}", joint)
+        (f"the {group.noun} {one.name}", joint)
         for group, members in grouped(mechanism)
         for one in (() if group.measures else members)
         for _, name, _ in joints_named(one)

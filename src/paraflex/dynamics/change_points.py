@@ -13,7 +13,7 @@ from paraflex.dynamics.projection import NAMED, second_rates
 from paraflex.dynamics.rank import DENSE_ROWS, Dependence, dependence
 from paraflex.dynamics.system import System
 from paraflex.kernel.packed import Signals
-from paraflex.mechanism.laws import ConstantSpeed, HeldAngle
+from paraflex.mechanism.profiles import ConstantSpeed, HeldAngle
 
 # Curvatures and rates below this fraction of the largest are rounding.
 _ROUNDING = 1e-7
@@ -23,7 +23,7 @@ _BESIDE = "start prescribed motions beside this pose and within the mechanism's 
 _TWO_BRANCHES = "give one of these rates in [start.velocity.angular], or start beside this pose"
 
 
-class Special(NamedTuple):
+class ChangePoint(NamedTuple):
     """A pose at which the branches of a motion meet.
 
     Attributes
@@ -42,7 +42,7 @@ class Special(NamedTuple):
     drives: str = ""
 
 
-def special_start(system: System, signals: Signals, t: float, q: Array, rows: Any, wanted: Array) -> Special:
+def change_point_at(system: System, signals: Signals, t: float, q: Array, rows: Any, target: Array) -> ChangePoint:
     """Find whether the branches of a motion meet at a pose.
 
     Velocities v0 + x n, n the null vector of the rows, have accelerations if w Phi''(v0 + x n) = 0, a quadratic
@@ -58,17 +58,17 @@ def special_start(system: System, signals: Signals, t: float, q: Array, rows: An
         Time [s].
     q : (n,) array
         Closed coordinates.
-    rows, wanted : (k, n) array or sparse matrix, and (k,) array
-        Phi_q and the rows of given velocities, and the wanted values of rows v.
+    rows, target : (k, n) array or sparse matrix, and (k,) array
+        Phi_q and the rows of given velocities, and the required values of rows v.
     """
     found = dependence(system, q) if 0 < system.m <= DENSE_ROWS else None
     if found is None or not found.dropped.size:
-        return Special()
+        return ChangePoint()
     scaled = (rows.toarray() if scipy.sparse.issparse(rows) else rows) * system.units
     null = scipy.linalg.null_space(scaled / np.maximum(np.linalg.norm(scaled, axis=1, keepdims=True), 1e-300), 1e-9)
     if null.shape[1] != 1:
-        return Special()
-    v, along = system.units * np.linalg.lstsq(scaled, wanted, rcond=1e-9)[0], system.units * null[:, 0]
+        return ChangePoint()
+    v, along = system.units * np.linalg.lstsq(scaled, target, rcond=1e-9)[0], system.units * null[:, 0]
 
     def missing(x: float, v: Array = v) -> Array:
         return found.conflict(second_rates(system, signals, t, q, v + x * along, np.zeros(system.n)))
@@ -76,21 +76,21 @@ def special_start(system: System, signals: Signals, t: float, q: Array, rows: An
     curvature = 0.5 * (missing(1.0, 0.0 * v) + missing(-1.0, 0.0 * v)) - missing(0.0, 0.0 * v)
     k = int(np.argmax(np.abs(curvature)))
     if abs(curvature[k]) <= _ROUNDING * system.row_units[found.dropped[k]]:
-        return Special()
-    drives = barred_drives(system, q, found)
-    barred = found.conflict(-wanted[: system.m])[k]
-    if abs(barred) > _ROUNDING * np.max(np.abs(wanted)):
-        return Special(
+        return ChangePoint()
+    drives = dependent_drives(system, q, found)
+    barred = found.conflict(-target[: system.m])[k]
+    if abs(barred) > _ROUNDING * np.max(np.abs(target)):
+        return ChangePoint(
             f"a dead centre, the limit of reach, with {drives}, where prescribed motions are not at rest", _BESIDE
         )
     terms = np.array([curvature[k], 0.5 * (missing(1.0) - missing(-1.0))[k], missing(0.0)[k]])
     roots = np.roots(np.where(np.abs(terms) <= _ROUNDING * np.max(np.abs(terms)), 0.0, terms))
     if np.iscomplexobj(roots):
-        return Special(
+        return ChangePoint(
             f"a dead centre, the limit of reach, with {drives}, beyond which prescribed motions lead", _BESIDE
         )
     if abs(roots[0] - roots[1]) <= _ROUNDING:
-        return Special()
+        return ChangePoint()
     what = f"a dead centre, with {drives}" if drives else "a change point"
     velocities = tuple(v + x * along for x in roots)
     turning = np.array([[one[body.angle] for one in velocities] for body in system.bodies])
@@ -102,7 +102,7 @@ def special_start(system: System, signals: Signals, t: float, q: Array, rows: An
         if abs(first - second) > rounding
     ]
     turns = f": {', '.join(rates[:NAMED])}" if rates else ""
-    return Special(
+    return ChangePoint(
         f"{what}, at which two branches meet{turns}", _TWO_BRANCHES if rates else _BESIDE, velocities, drives
     )
 
@@ -111,14 +111,14 @@ def branches_from_rest(system: System, signals: Signals, t: float, q: Array) -> 
     """Return whether prescribed motions, all at rest, are at a change point from which two branches lead on."""
     moves = np.zeros(system.m)
     for motion, row in driven_rows(system):
-        moves[row] = not isinstance(motion.law, HeldAngle | ConstantSpeed)
+        moves[row] = not isinstance(motion.profile, HeldAngle | ConstantSpeed)
     if not np.any(moves):
         return False
-    found = special_start(system, signals, t, q, system.jacobian(q), moves)
+    found = change_point_at(system, signals, t, q, system.jacobian(q), moves)
     return bool(found.velocities) and not found.drives
 
 
-def barred_drives(system: System, q: Array, found: Dependence) -> str:
+def dependent_drives(system: System, q: Array, found: Dependence) -> str:
     """List prescribed motions that take part in dependences of rows, with values of their joints; empty for none."""
     units, rows = system.row_units, set()
     for k, row in enumerate(found.dropped):
