@@ -262,7 +262,7 @@ def reaction_table(data: xr.Dataset) -> Table:
     return Table("Reactions", [
         Column("joint", names),
         *(Column(f"force {axis}", list(force[:, k]), "N", beside=beside["N"]) for k, axis in enumerate("xy")),
-        Column("moment", moment.tolist(), "N m", beside=beside["N m"]),
+        Column("moment", [float(each) for each in moment], "N m", beside=beside["N m"]),
     ], "On the joint's second body, in the ground frame, at the last step.")  # fmt: skip
 
 

@@ -48,10 +48,10 @@ def law_comparison(data: xr.Dataset) -> Iterator[Chart]:
             curves.append(Curve("", places, np.where(beyond[k], values[k], np.nan), own, mark="ring"))
             if missing.any():
                 curves.append(Curve("", places[missing], np.full(int(missing.sum()), edge), own, mark="cross"))
-        for word, mark, shown in (("not run to the end", "cross", data["status"].values != "complete"),
-                                  ("beyond what the model can describe", "ring", beyond)):  # fmt: skip
-            if shown.any():
-                curves.append(Curve(word, [], [], mark=mark))
+        if (data["status"].values != "complete").any():
+            curves.append(Curve("not run to the end", [], [], mark="cross"))
+        if beyond.any():
+            curves.append(Curve("beyond what the model can describe", [], [], mark="ring"))
         yield Chart(name, metric_label(name), Axis("", names=laws), curves,
                     Axis("", data[name].attrs["units"], log=True, low=None if is_wide(values) else 0.0))  # fmt: skip
 

@@ -160,7 +160,7 @@ def _of_parts(
 def _by_model(data: xr.Dataset, y: Array, x: Array | None = None, choice: int | None = None) -> list[Curve]:
     """Return the curves of values (modes, models, samples): those of all models in the mode of the selected run."""
     places = data["end_effector"].transpose("mode", "model", "time", "axis").values
-    known = np.isfinite(places).all(axis=-1, keepdims=True)[..., 0]
+    known = np.isfinite(places.sum(axis=-1))
     models = names_of(data, "model")
     return [
         Curve(

@@ -193,7 +193,7 @@ def equal_scales_height(figure: Figure, panel: Axes) -> float:
 
 
 def finish_plane(figure: Figure, axes: Axes) -> Figure:
-    """Set the limits of the only panel, with a margin and a least size for a line or a point, and lay out the figure."""
+    """Set the limits of the only panel, with a margin and a least size for a line or point, and lay out the figure."""
     box = axes.dataLim
     width, height = ((1.0 + 2.0 * _MARGIN) * extent for extent in (box.width, box.height))
     width = max(width, height / (_TALLEST if is_narrow(ONE_COLUMN) else _TALLEST_WIDE)) or 1.0

@@ -13,7 +13,7 @@ from matplotlib.patches import FancyArrowPatch
 from numpy.typing import NDArray
 
 from paraflex.figures.shapes import figure_of
-from paraflex.formatting import printable
+from paraflex.formatting import number as number_text, printable
 from paraflex.mechanism import GROUND, Mechanism
 from paraflex.plots.drawing import Sketch
 from paraflex.plots.layout import MM, TWO_COLUMNS, page_width
@@ -200,7 +200,8 @@ def _draw_gravity(axes: Axes, mechanism: Mechanism, limits: Limits, look: Theme)
     ends = np.array([corner - 0.5 * room * weight / size, corner + 0.5 * room * weight / size])
     _arrow(axes, ends[0], ends[1], look.earth, 11.0, 1.4)
     axes.annotate(
-        f"g = {number_text(size, 3, padded=True)} m/s²", (corner[0], corner[1]), xytext=(-6.0, 0.0), textcoords="offset points",
+        f"g = {number_text(size, 3, padded=True)} m/s²", (corner[0], corner[1]), xytext=(-6.0, 0.0),
+        textcoords="offset points",
         ha="right", va="center", fontsize=_TEXT - 0.5, color=look.earth,
     )  # fmt: skip
     return [ends, np.array([corner - [0.22 * (limits.right - limits.left), 0.0], corner])]
