@@ -282,7 +282,7 @@ def test_one_mode_has_no_choice_of_modes():
     page = told(html_of(tracking_page(tracked().isel(mode=[1]))))
     assert page["runs"] == [MODES[1]]
     assert page["selected"] == 0
-    assert [name for name in chart_of(page, "torques")["choices"] if "all modes" in name] == []
+    assert {curve["run"] for curve in chart_of(page, "torques")["curves"]} == {0}
 
 
 def test_runs_without_a_single_sample_still_have_a_report():
