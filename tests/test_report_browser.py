@@ -10,7 +10,7 @@ from playwright.sync_api import Browser, Page
 from colours import APART, colour_distance
 from conftest import DESKTOP, PHONE, is_ours, page_asks
 from paraflex.plots.themes import THEMES
-from paraflex.report import Chart, Page as ReportPage, Panel, save_page, tracking_page, verification_page
+from paraflex.report import Chart, Curve, Page as ReportPage, Panel, save_page, tracking_page, verification_page
 from reports import FAILED, MODES, tracked, verified
 
 # Of opening, on a machine that is busy with other tests as well: the best of so many is told [ms].
@@ -379,7 +379,7 @@ def test_the_selector_of_modes_changes_curves_and_mechanism(shared):
         assert other == pytest.approx(data[1, :, k].tolist(), rel=1e-5, abs=1e-30)
     assert drawn(page) != picture
     # Another motor beside itself in all modes: the selected one is the thickest.
-    page.locator("#chart-torques select").select_option(label="τ₁, all modes")
+    page.locator("#chart-torques select").select_option(label="τ₁")
     wait_for_drawing(page)
     assert len(curves(page, "torques")) == len(MODES)
     widths = page.evaluate("document.querySelector('#chart-torques .js-plotly-plot').data.map((t) => t.line.width)")
@@ -533,3 +533,20 @@ def test_parallel_coordinates_are_drawn_too(opened, tmp_path):
     page = opened(tmp_path / "a.html")
     page.locator("#chart-all").scroll_into_view_if_needed()
     page.wait_for_function("document.querySelector('#chart-all .parcoords')")
+
+
+def test_more_than_six_charts_of_a_panel_are_folded_and_drawn_once_they_are_opened_or_printed(opened, tmp_path):
+    time = [0.0, 0.5, 1.0]
+    lines = [Chart(f"c{k}", f"Chart {k}", "y", [Curve("a", [0.0, k, 1.0])]) for k in range(8)]
+    save_page(ReportPage("a", "run", panels=[Panel("Six", lines[:6]), Panel("Two more", lines)], time=time, runs=[""]),
+              tmp_path / "a.html")  # fmt: skip
+    page = opened(tmp_path / "a.html")
+    assert page.locator("#panels details").count() == 1
+    assert page.locator("#panels summary").inner_text() == "2 more charts: Chart 6, Chart 7"
+    assert not page.locator("#chart-c7").is_visible()
+    page.locator("#panels summary").click()
+    assert curves(page, "c7") == [[0.0, 7.0, 1.0]]
+    page.locator("#panels summary").click()
+    page.evaluate("dispatchEvent(new Event('beforeprint'))")
+    assert page.locator("#chart-c6").is_visible()
+    page.evaluate("dispatchEvent(new Event('afterprint'))")
