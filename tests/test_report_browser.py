@@ -379,7 +379,7 @@ def test_the_selector_of_modes_changes_curves_and_mechanism(shared):
         assert other == pytest.approx(data[1, :, k].tolist(), rel=1e-5, abs=1e-30)
     assert drawn(page) != picture
     # Another motor beside itself in all modes: the selected one is the thickest.
-    page.locator("#chart-torques select").select_option(label="τ₁, all modes")
+    page.locator("#chart-torques select").select_option(label="τ₁")
     wait_for_drawing(page)
     assert len(curves(page, "torques")) == len(MODES)
     widths = page.evaluate("document.querySelector('#chart-torques .js-plotly-plot').data.map((t) => t.line.width)")
