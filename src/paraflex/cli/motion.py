@@ -31,6 +31,7 @@ from paraflex.errors import ControllerError, InputError, IntegrationError, Resul
 from paraflex.files import Model, StudyDefaults
 from paraflex.findings import DONE_STATUSES
 from paraflex.folders import RUN, ResultsFolder
+from paraflex.formatting import number
 from paraflex.integrators import IntegrationOptions
 from paraflex.mechanism import Mechanism
 from paraflex.motion import MotionRun, simulate_motion, state_at
@@ -192,8 +193,10 @@ def _ended(summary: dict) -> str:
     """Describe how a run ended: the time of its end or, after a failure, of the last sample before it."""
     status, steps, time = summary["status"], f"{summary['steps']} steps", summary["final"]["time"]
     if status in DONE_STATUSES:
-        return f"{status} at t = {time:g} s, {steps}"
-    return f"{status}, {steps}; " + ("no sample was reached" if time is None else f"the last sample is t = {time:g} s")
+        return f"{status} at t = {number(time, 6)} s, {steps}"
+    return f"{status}, {steps}; " + (
+        "no sample was reached" if time is None else f"the last sample is t = {number(time, 6)} s"
+    )
 
 
 def _report(out: Console, summary: dict) -> None:
@@ -211,17 +214,17 @@ def _report(out: Console, summary: dict) -> None:
     unknown = max(_ROUNDING * wide, summary["constraint_position_max"])
     for point, position in list(places.items())[:_MOST_POINTS]:
         x, y = (0.0 if abs(each) < unknown else each for each in position)
-        out.print(f"  {point}: ({x:.6g}, {y:.6g}) m")
+        out.print(f"  {point}: ({number(x, 6)}, {number(y, 6)}) m")
     if len(places) > _MOST_POINTS:
         out.print(f"  and {len(places) - _MOST_POINTS} more points in results.nc")
-    passed = [f"{t:.6g}" for t in summary["singular_positions"]]
+    passed = [number(t, 6) for t in summary["singular_positions"]]
     if passed:
         more = f" and {len(passed) - _MOST_TIMES} more" if len(passed) > _MOST_TIMES else ""
         out.print(
             f"passed singular positions at t = {', '.join(passed[:_MOST_TIMES])} s{more}: joint forces have poles there"
         )
     out.print(
-        f"largest violation of constraints {summary['constraint_position_max']:.1e} m, "
-        f"imbalance of energy {summary['energy_balance_max']:.1e} J"
+        f"largest violation of constraints {number(summary['constraint_position_max'], 2)} m, "
+        f"imbalance of energy {number(summary['energy_balance_max'], 2)} J"
     )
     validity(out, {"": summary["validity"]})
