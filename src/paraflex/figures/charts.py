@@ -24,6 +24,9 @@ DASHED, DOTTED = 1, 2
 _DECADE = 10.0
 
 
+Mark = Literal["", "ring", "cross", "square", "dot", "triangle", "diamond", "bar"]
+
+
 class Look(NamedTuple):
     """Look of a curve: index of one of eight colours, or None for the colour of text, and dashes.
 
@@ -143,7 +146,7 @@ class Curve:
     desired: bool = False
     stopped: bool = False
     quiet: bool = False
-    mark: Literal["", "ring", "cross", "square", "dot", "triangle", "diamond", "bar"] = ""
+    mark: Mark = ""
     line: bool = False
     texts: Sequence[str] = ()
 

@@ -8,7 +8,7 @@ import numpy as np
 import xarray as xr
 
 from paraflex.figures.catalogue import figure
-from paraflex.figures.charts import Array, Axis, Chart, Curve, is_wide, look
+from paraflex.figures.charts import Array, Axis, Chart, Curve, Mark, is_wide, look
 from paraflex.figures.selection import names_of
 from paraflex.figures.tables import Column, Table
 from paraflex.results.metrics import METRICS, VALIDITY, metric_label
@@ -17,7 +17,7 @@ from paraflex.units import DisplayUnit
 # Metrics shown first; others fill the remaining panels.
 _FIRST = ("tracking_rms_motion", "tracking_rms", "residual_vibration", "peak_torque_max")
 _PANELS = 3
-_MARKS = ("dot", "square", "triangle", "diamond")
+_MARKS: tuple[Mark, ...] = ("dot", "square", "triangle", "diamond")
 # Share of a law's line over which its modes are spread.
 _BAND = 0.6
 # Internal torques below this share of the peak torque are rounding errors.
@@ -48,10 +48,10 @@ def law_comparison(data: xr.Dataset) -> Iterator[Chart]:
             curves.append(Curve("", places, np.where(beyond[k], values[k], np.nan), own, mark="ring"))
             if missing.any():
                 curves.append(Curve("", places[missing], np.full(int(missing.sum()), edge), own, mark="cross"))
-        for word, mark, shown in (("not run to the end", "cross", data["status"].values != "complete"),
-                                  ("beyond what the model can describe", "ring", beyond)):  # fmt: skip
-            if shown.any():
-                curves.append(Curve(word, [], [], mark=mark))
+        if (data["status"].values != "complete").any():
+            curves.append(Curve("not run to the end", [], [], mark="cross"))
+        if beyond.any():
+            curves.append(Curve("beyond what the model can describe", [], [], mark="ring"))
         yield Chart(name, metric_label(name), Axis("", names=laws), curves,
                     Axis("", data[name].attrs["units"], log=True, low=None if is_wide(values) else 0.0))  # fmt: skip
 

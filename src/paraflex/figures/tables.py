@@ -147,7 +147,7 @@ def in_row_units(columns: Sequence[Column], units: Sequence[str]) -> list[Column
     shown = [common_unit(unit, [column.cells[k] for column in columns]) for k, unit in enumerate(units)]  # type: ignore[misc]
     converted = [
         replace(column, cells=[None if cell is None else unit.factor * cell
-                               for cell, unit in zip(column.cells, shown, strict=True)])  # type: ignore[operator]
+                               for cell, unit in zip(column.cells, shown, strict=True)])  # type: ignore[reportOperatorIssue]
         for column in columns
     ]  # fmt: skip
     return [*converted, Column("unit", [NO_VALUE if unit.name in ("", "1") else unit.name for unit in shown])]

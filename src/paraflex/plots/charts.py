@@ -182,7 +182,7 @@ def _cells(entry: CatalogueFigure, charts: Sequence[Chart], runs: Mapping[str, i
     run = 0 if entry.takes in ("mode", "models") else None
     several = len(charts) > 1
     if entry.panels == "runs":
-        return [[_Cell(chart, r, 0, f"{name}: {_lower(chart.title)}" if several else name) for name, r in runs.items()]
+        return [[_Cell(chart, r, 0, f"{name}: {_beside_axis(chart)}" if several else name) for name, r in runs.items()]
                 for chart in charts]  # fmt: skip
     if entry.panels == "choices":
         members = max(len(chart.choices) - chart.overview for chart in charts)
@@ -199,8 +199,9 @@ def _member(chart: Chart, run: int | None, k: int) -> _Cell:
     return _Cell(chart, run, choice, f"{chart.choices[choice]}: {chart.axis(choice).name}")
 
 
-def _lower(title: str) -> str:
-    return title[:1].lower() + title[1:]
+def _beside_axis(chart: Chart) -> str:
+    """Return the title of a chart without the name that its axis has: "from the desired position"."""
+    return (chart.title[:1].lower() + chart.title[1:]).removeprefix(chart.axis(None).name).strip()
 
 
 def _draw(panel: Axes, cell: _Cell, time: Any, most: int, *, named: bool = True) -> None:
