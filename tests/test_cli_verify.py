@@ -20,7 +20,9 @@ def test_verify_prints_and_saves_how_models_agree(tmp_path):
                     "--out", str(out))  # fmt: skip
     assert done.returncode == 0, done.stderr
     assert done.stdout.startswith("warning: study.duration: only a part of the path was run: 0.02 of 0.532 s")
-    assert "RMS tracking error during the motion, and distances from the path of second-order geometry" in done.stdout
+    assert (
+        "error over the whole run, dwell included, and distances from the path of second-order geometry" in done.stdout
+    )
     assert "Models, mode ++++\n" in done.stdout
     assert "Distances of paths, mode ++++\n" in done.stdout
     assert "Difference of angular velocities from second-order geometry, mode ++++\n" in done.stdout

@@ -116,7 +116,7 @@ def test_the_dataset_has_all_models_and_survives_a_file(verification, tmp_path):
 def test_figures_overlay_the_models(verification, tmp_path):
     data = verification.data
     written = plots.save_figures(data, tmp_path)
-    names = ["compared_links_++++", "compared_paths_++++", "model_distances"]
+    names = ["model_distances", "compared_paths_++++", "compared_links_++++"]
     assert [path.name for path in written] == [f"{name}.{suffix}" for name in names for suffix in ("png", "svg")]
     links = plots.compared_links(data, "++++", ("second-order", "segments"))
     assert len(links.axes) == 16
@@ -127,8 +127,9 @@ def test_figures_overlay_the_models(verification, tmp_path):
         np.testing.assert_array_equal(line.get_ydata(), values)
     distances = plots.model_distances(data)
     far = next(line for line in distances.axes[1].lines if line.get_label() == "rigid").get_ydata()
+    factor = {"distance [mm]": 1e3, "distance [µm]": 1e6}[distances.axes[1].get_ylabel()]
     assert np.nanmax(far) == pytest.approx(
-        1e3 * verification.to_dict()["modes"]["++++"]["models"]["rigid"]["distance_max"]
+        factor * verification.to_dict()["modes"]["++++"]["models"]["rigid"]["distance_max"]
     )
     with pytest.raises(InputError, match="no such model"):
         plots.compared_paths(data, "++++", ("second-order", "adams"))

@@ -8,12 +8,12 @@ from typing import Any
 import numpy as np
 
 from paraflex.figures.catalogue import figure
-from paraflex.figures.charts import Axis, Chart, Curve, Look, Span
+from paraflex.figures.charts import Axis, Chart, Curve, Look, Mark, Span
 from paraflex.figures.tables import Column, Table
 from paraflex.formatting import number
 
 # Dashes and marks of the methods of a family; its members differ in colour.
-_FAMILIES: Mapping[str, tuple[int, Any]] = {
+_FAMILIES: Mapping[str, tuple[int, Mark]] = {
     "esdirk": (0, "dot"), "newmark": (1, "square"), "scipy": (3, "triangle"), "sundials": (2, "diamond"),
 }  # fmt: skip
 # Orders of the multistep methods that are shown; IDA is omitted because its characteristic roots are those of BDF.
@@ -85,7 +85,7 @@ def numerical_damping(curves: Sequence[tuple[str, int | None]] | None = None) ->
     yield Chart("radius", "Spectral radius", Axis("", low=0.0, high=_GROWN), found["radius"], over, levels=[1.0])
 
 
-def _lines(methods: Mapping[str, Any]) -> list[tuple[str, Look, Any, list[dict[str, Any]]]]:
+def _lines(methods: Mapping[str, Any]) -> list[tuple[str, Look, Mark, list[dict[str, Any]]]]:
     """Return name, look, mark and complete runs of each line.
 
     Runs are ordered by decreasing error; those of zero error are left out.
@@ -99,7 +99,7 @@ def _lines(methods: Mapping[str, Any]) -> list[tuple[str, Look, Any, list[dict[s
             runs = [run for run in done if (run["step"] is not None) == fixed]
             if runs:
                 name = f"{method['title']}, fixed steps" if fixed else method["title"]
-                mark = "ring" if fixed else _FAMILIES[method["family"]][1]
+                mark: Mark = "ring" if fixed else _FAMILIES[method["family"]][1]
                 lines.append((name, own, mark, sorted(runs, key=lambda run: -run["error"])))
     return lines
 

@@ -49,13 +49,12 @@ def printed(model: str) -> str:
 def model_distances(data: xr.Dataset) -> Iterator[Chart]:
     """Yield charts of the end-effector's distance from its desired position and from that in the reference model."""
     reference = str(data.attrs["reference"])
-    places = data["end_effector"]
+    places, wanted = _places(data)
+    datum = names_of(data, "model").index(reference)
     for identity, title, other in (
-        ("errors", "the desired position", data["end_effector_desired"]),
-        ("apart", printed(reference), places.sel(model=reference, drop=True)),
-    ):
-        squares = ((places - other) ** 2).sum("axis", skipna=False).transpose("mode", "model", "time").values
-        away = np.sqrt(squares)
+        ("errors", "the desired position", wanted), ("apart", printed(reference), places[:, datum : datum + 1])
+    ):  # fmt: skip
+        away = np.linalg.norm(places - other, axis=-1)
         curves = _by_model(data, np.where(away > _SMALLEST_DISTANCE, away, np.nan))
         yield Chart(identity, f"Distance from {title}", Axis("distance", "m", log=True), curves,
                     spans=after_motion(data))  # fmt: skip
@@ -72,9 +71,8 @@ def compared_paths(data: xr.Dataset, magnification: float | None = None) -> Iter
     magnification : float, optional
         Magnification of the deviations; by default a value at which they are visible.
     """
-    desired, places = (data[name].transpose("mode", "model", "time", "axis").values
-                       for name in ("end_effector_desired", "end_effector"))  # fmt: skip
-    desired = desired[0, 0]
+    places, wanted = _places(data)
+    desired = wanted[0, 0]
     times = magnification
     if times is None:
         times = round_magnification((places - desired).reshape(-1, 2), float(np.ptp(desired, axis=0).max()))
@@ -159,8 +157,7 @@ def _of_parts(
 
 def _by_model(data: xr.Dataset, y: Array, x: Array | None = None, choice: int | None = None) -> list[Curve]:
     """Return the curves of values (modes, models, samples): those of all models in the mode of the selected run."""
-    places = data["end_effector"].transpose("mode", "model", "time", "axis").values
-    known = np.isfinite(places.sum(axis=-1))
+    known = np.all(np.isfinite(_places(data)[0]), axis=-1)
     models = names_of(data, "model")
     return [
         Curve(
@@ -169,6 +166,13 @@ def _by_model(data: xr.Dataset, y: Array, x: Array | None = None, choice: int | 
         )
         for m in range(len(y)) for k, model in enumerate(models)
     ]  # fmt: skip
+
+
+def _places(data: xr.Dataset) -> tuple[Array, Array]:
+    """Return actual and desired positions of the end-effector (modes, models, samples, 2) [m]."""
+    actual, desired = (data[f"end_effector{which}"].transpose("mode", "model", "time", "axis").values
+                       for which in ("", "_desired"))  # fmt: skip
+    return actual, desired
 
 
 def runs_of_mode(data: xr.Dataset, mode: int) -> tuple[int, ...]:

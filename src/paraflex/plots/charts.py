@@ -213,7 +213,9 @@ def _cells(entry: CatalogueFigure, charts: Sequence[Chart], runs: Mapping[str, i
 
 
 def _title_of_run(chart: Chart, k: int, name: str, several: bool) -> str:
-    words = [name, *([chart.title[:1].lower() + chart.title[1:]] if several else []), *chart.of_runs[k : k + 1]]
+    # Without the name that the axis has: "from the desired position".
+    title = (chart.title[:1].lower() + chart.title[1:]).removeprefix(chart.axis(None).name).strip()
+    words = [name, *([title] if several else []), *chart.of_runs[k : k + 1]]
     return ": ".join(filter(None, words))
 
 

@@ -9,10 +9,9 @@ from collections.abc import Sequence
 from typing import Literal
 
 from matplotlib.axes import Axes
-from matplotlib.axis import Axis
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 
-from paraflex.formatting import logarithmic_number, power_of_ten
+from paraflex.formatting import logarithmic_number
 from paraflex.plots.labels import plain
 
 # Height of a line in a list of names [mm].
@@ -27,13 +26,6 @@ def mark_powers(panel: Axes, direction: Literal["x", "y"] = "y", *, wide: float 
     several = high > wide * low
     axis.set_major_locator(LogLocator(numticks=12) if several else LogLocator(subs=(1.0, 2.0, 5.0)))
     axis.set_major_formatter(FuncFormatter(lambda value, _: logarithmic_number(value)))
-    axis.set_minor_formatter(NullFormatter())
-
-
-def name_powers(axis: Axis) -> None:
-    """Number a logarithmic axis at powers of ten only."""
-    axis.set_major_locator(LogLocator(numticks=12))
-    axis.set_major_formatter(FuncFormatter(lambda value, _: power_of_ten(value)))
     axis.set_minor_formatter(NullFormatter())
 
 
