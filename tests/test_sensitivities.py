@@ -404,7 +404,7 @@ def test_command(tmp_path):
     file, out = write(tmp_path, text), tmp_path / "out"
     done = paraflex("sensitivity", str(file), "--output", str(out))
     assert done.returncode == 0, done.stderr
-    assert "tracking_rms [m]" in done.stdout
+    assert "RMS tracking error" in done.stdout
     assert "…" not in done.stdout
     figures = json.loads((out / "sensitivity.json").read_text())
     assert figures["parameters"]["thickness"] == {"value": 0.005, "fields": ["section.bar.thickness"]}
