@@ -431,9 +431,9 @@ def test_command_again_and_elsewhere(tmp_path, capsys):
     assert ask() == 0
     figures = json.loads(capsys.readouterr().out)
     assert ask(as_json=False) == 0
-    out = capsys.readouterr().out
-    assert "of τ₆" in out
-    assert "N m" in out
+    printed = capsys.readouterr().out
+    assert "of τ₆" in printed
+    assert "N m" in printed
     assert read_json(out / "sensitivity.json") == figures
     capsys.readouterr()
     assert ask(at=["thickness=0.006"]) == 0
