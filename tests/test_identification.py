@@ -244,7 +244,7 @@ def test_the_figure_shows_every_target(tmp_path):
     figure = targets_reached(result.to_dict())
     panel = figure.axes[0]
     names = [text.get_text() for text in panel.get_yticklabels()]
-    assert names == [f"++++ {name}" for name in ("RMS tracking error", "peak torque", "mass")]
+    assert names == ["RMS tracking error", "peak torque", "mass"]
     best = next(each for each in panel.get_lines() if each.get_label() == "best")
     ratios = [each.reached / each.target.value for each in result.targets]
     assert list(best.get_xdata()) == pytest.approx(ratios)

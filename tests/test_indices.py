@@ -156,7 +156,7 @@ def test_command_line(tmp_path):
     asked = ("indices", file, "--metric", "tracking_rms", "--samples", "8", "--output", out)
     done = paraflex(*asked)
     assert done.returncode == 0, done.stderr
-    assert "tracking_rms" in done.stdout
+    assert "RMS tracking error" in done.stdout
     assert (out / "figures" / "indices.png").exists()
     again = paraflex(*asked, "--json")
     assert again.returncode == 0, again.stderr

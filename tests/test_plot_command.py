@@ -444,10 +444,10 @@ def test_response_curves_show_the_table(results: Path) -> None:
     runs = source.designs.in_modes(["++++"])
     shown = {line.get_label(): np.column_stack(line.get_data()) for line in rows[0].lines}
     points = next(values for values in shown.values() if len(values) == 16)
-    np.testing.assert_allclose(points, np.column_stack([runs.parameters["x"], runs.metrics["total_mass"]]))
-    np.testing.assert_allclose(points[:, 1], 3.0 + 100.0 * points[:, 0] + runs.parameters["y"])
+    np.testing.assert_allclose(points, np.column_stack([1e3 * runs.parameters["x"], runs.metrics["total_mass"]]))
+    np.testing.assert_allclose(points[:, 1], 3.0 + 0.1 * points[:, 0] + runs.parameters["y"])
     assert rows[0].get_ylabel() == "mass [kg]"
-    assert [axes.get_xlabel() for axes in rows] == ["x", "y"]
+    assert [axes.get_xlabel() for axes in rows] == ["x [mm]", "y [kg]"]
 
 
 def test_the_front_is_of_what_no_other_design_is_better_than(results: Path) -> None:

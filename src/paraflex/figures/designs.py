@@ -268,15 +268,16 @@ def response_curves(table: DesignTable, metrics: Sequence[str] | None = None) ->
     for parameter in table.varied[:_MOST_PARAMETERS]:
         curves = []
         for k, (pair, runs) in enumerate(table.series.items()):
-            order = np.argsort(runs.parameters[parameter], kind="stable")
-            x = runs.parameters[parameter][order]
+            x, name = runs.parameters[parameter], table.series_name(pair)
+            order, alone = np.argsort(x, kind="stable"), len(table.varied) == 1
             for choice, metric in enumerate(rows):
-                y, name = runs.metrics[metric][order], table.series_name(pair)
-                alone = len(table.varied) == 1
-                curves.append(_marked(k, name if alone else "", x, y, choice=choice, line=alone, faint=not alone))
-                if not alone:
-                    middles = _medians(x, y)
-                    curves.append(Curve(f"{name}, median", middles[1], middles[0], look(k), choice=choice))
+                y = runs.metrics[metric]
+                if alone:
+                    curves.append(_marked(k, name, x[order], y[order], choice=choice, line=True))
+                    continue
+                middles = _medians(x[order], y[order])
+                curves += [_marked(k, "", x, y, choice=choice, faint=True),
+                           Curve(f"{name}, median", middles[1], middles[0], look(k), choice=choice)]  # fmt: skip
         yield Chart(f"responses-{parameter}", "", axes, curves, table.axis(parameter), [one.name for one in axes])
 
 

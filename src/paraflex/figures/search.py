@@ -121,10 +121,10 @@ def sobol_bars(figures: Mapping[str, Any]) -> Iterator[Chart]:
             y = np.arange(len(rows), dtype=float) + 0.38 * (k - 0.5)
             x, wide = (np.array([row[one] for row in rows], float) for one in (key, f"{key}_confidence"))
             curves.append(Curve(name, y, x, look(k), choice=choice, mark="bar", thickness=0.34))
-            curves.append(Curve("", *_gapped(y, x, wide), choice=choice, quiet=True))
+            curves.append(Curve("interval of 95 %", *_gapped(y, x, wide), choice=choice, quiet=True))
     if curves:
         names = [row["parameter"] for row in next(iter(found.values()))]
-        axis = Axis("share of the variance (lines: intervals of 95 %)", zero=True)
+        axis = Axis("share of the variance", zero=True)
         yield Chart("indices", "Sobol indices", Axis("", names=names), curves, axis, choices, choosing="metric")
 
 
