@@ -26,11 +26,10 @@ from paraflex.designs.reopen import open_study
 from paraflex.errors import InputError, OutputError
 from paraflex.files import library_text
 from paraflex.folders import RUN, finish_change, hold_folder, read_manifest
-from paraflex.formatting import labelled
+from paraflex.formatting import NO_VALUE, labelled, number
 from paraflex.plots.labels import plain
 from paraflex.plots.sources import open_source
 from paraflex.plots.svg import sketch
-from paraflex.report.text import NO_VALUE, number
 from paraflex.results.export import _write_table, export, export_table
 from paraflex.results.spreadsheet import spreadsheet_table
 from paraflex.studies import load_sweep, sweep
@@ -283,7 +282,7 @@ def test_warnings_of_others_do_not_move_the_terminal():
 
 
 def test_numbers_beyond_all_in_their_unit_are_none_in_reports():
-    assert number(-1e308, 1e6) == number(float("inf")) == NO_VALUE
+    assert number(-1e308, factor=1e6) == number(float("nan")) == NO_VALUE
 
 
 def test_what_results_without_a_seal_lead_to_is_one_line(tmp_path):

@@ -29,7 +29,6 @@ from paraflex.report import (
 from paraflex.report.film import MOST_FRAMES, frames_of
 from paraflex.report.packing import Series, packed
 from paraflex.report.page import plotly_script
-from paraflex.report.text import common_unit, count, number
 from paraflex.results import load_results, open_results
 from reports import FAILED, MODES, STOPPED, array_of, chart_of, html_of, rows_of, told, tracked, verified
 from shell import paraflex
@@ -77,11 +76,10 @@ def test_many_notices_are_folded_and_all_there():
 
 
 def test_what_is_only_rounding_is_printed_as_zero():
-    assert number(1e-17, 1e3, beside=0.3) == "0"
-    assert number(-1e-17, 1e3, beside=0.3) == "0"
-    assert number(1e-12, 1e3, beside=0.3) == "1.00 × 10⁻⁹"
-    assert number(1e-17) == "1.00 × 10⁻¹⁷"
-    assert number(1e-17, beside=np.nan) == "1.00 × 10⁻¹⁷"
+    number = formatting.number
+    assert number(1e-17, factor=1e3, beside=0.3) == number(-1e-17, factor=1e3, beside=0.3) == "0"
+    assert typeset(number(1e-12, factor=1e3, beside=0.3, digits=3, padded=True)) == "1.00 × 10⁻⁹"
+    assert number(1e-17) == number(1e-17, beside=np.nan) == "1e-17"
     data = tracked().copy(deep=True)
     data["energy_balance_max"][:] = 3e-18
     data["tracking_rms_motion"][0] = data["tracking_rms"][0] = 2e-17
@@ -358,15 +356,16 @@ def test_raw_figures_of_plotly_go_through():
     ],
 )  # fmt: skip
 def test_one_unit_in_which_no_value_needs_a_power_of_ten(values, unit):
-    assert common_unit("m", values, beside=1.0).name == unit
+    assert formatting.common_unit("m", values, beside=1.0).name == unit
 
 
 def test_numbers_and_names_as_print_has_them():
-    assert [number(x) for x in (0.0, 0.377_4, 12.345, 9_876.5, -1.2e-5, None, float("nan"))] == [
+    numbers = (0.0, 0.377_4, 12.345, 9_876.5, -1.2e-5, None, float("nan"))
+    assert [typeset(formatting.number(x, 3, padded=True)) for x in numbers] == [
         "0", "0.377", "12.3", "9876", "−1.20 × 10⁻⁵", "–", "–",
     ]  # fmt: skip
     assert [symbol(name) for name in ("tau1", "A2", "link10", "α<b>")] == ["τ₁", "A₂", "link10", "α<b>"]
-    assert count(43708.0) == "43\u2009708"
+    assert typeset(formatting.count(43708.0)) == "43\u2009708"
 
 
 def test_a_page_appears_whole_or_not_at_all(tmp_path):

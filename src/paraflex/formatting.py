@@ -34,6 +34,8 @@ _CONTROL = re.compile(r"[\x00-\x08\x0b-\x1f\x7f]")
 # Longest name or unit that is shown whole.
 LONGEST = 200
 _POWER = re.compile(r"\^(-?\d+)")
+# Number of digits from which those of whole numbers are separated in groups of three.
+_GROUPED = 5
 # Numbers within a text, with the parts that are typeset.
 _WRITTEN = re.compile(r"(?<![\w.])(-)?(\d+(?:\.\d*)?)(?:e([+-]\d+))?(?![\w])")
 
@@ -48,8 +50,8 @@ _PREFIXES = {
     "W": (DisplayUnit("kW", 1e-3), DisplayUnit("W", 1.0)),
     "m/N": (DisplayUnit("mm/N", 1e3), DisplayUnit("µm/N", 1e6), DisplayUnit("nm/N", 1e9)),
 }
-# Magnitude from which a small value of several stands in the unit of the largest.
-_FEW_ZEROS = 0.01
+# Magnitudes from which and below which values of several have a common unit with few zeros and digits.
+_FEW_ZEROS, _FEW_DIGITS = 0.01, 1e4
 # Smallest peak for which a unit is used; GPa is for moduli, stresses are in MPa.
 _LEAST, _LEAST_OF = 0.1, {"GPa": 2.0, "kN/mm": 1.0, "kN": 10.0, "kN m": 10.0, "kW": 10.0}
 
@@ -86,7 +88,8 @@ def number(
     if value is None or math.isnan(value):
         return missing
     if math.isinf(factor * value):
-        return infinite
+        # A number beyond all in its unit is not known.
+        return infinite if math.isinf(value) else missing
     if value == 0.0 or (math.isfinite(beside) and abs(value) < _ROUNDING * beside):
         return "0"
     value = factor * value
@@ -112,6 +115,8 @@ def superscripts(text: str) -> str:
 
 def _typeset(found: re.Match[str]) -> str:
     sign, digits, exponent = found.groups()
+    if digits.isdecimal() and len(digits) >= _GROUPED and not exponent:
+        digits = f"{int(digits):,}".replace(",", "\N{THIN SPACE}")
     power = f" × 10{raised(int(exponent))}" if exponent else ""
     return ("−" if sign else "") + digits + power
 
@@ -208,9 +213,9 @@ def common_unit(unit: str, values: Iterable[float | None] | ArrayLike, *, beside
     rest = choices[choices.index(first) :]
     fits = (
         one
-        for smallest in (_FEW_ZEROS, _SMALLEST_PLAIN)
+        for smallest, largest in ((_FEW_ZEROS, _FEW_DIGITS), (_SMALLEST_PLAIN, _LARGEST_PLAIN))
         for one in rest
-        if least * one.factor >= smallest and most * one.factor < 0.1 * _LARGEST_PLAIN
+        if least * one.factor >= smallest and most * one.factor < largest
     )
     return next(fits, first)
 

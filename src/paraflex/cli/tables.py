@@ -263,11 +263,6 @@ def failures(console: Console, result: StudyResult, whose: str = "") -> None:
         console.print(f"error: {whose}{reason}", soft_wrap=True)
 
 
-def number(value: float | None, form: str) -> str:
-    """Return a number in a format; empty for None."""
-    return "" if value is None else format(value, form)
-
-
 def few(names: Sequence[Any], most: int) -> str:
     """Return the first `most` names as text, and how many more there are."""
     more = f" and {len(names) - most} more" if len(names) > most else ""

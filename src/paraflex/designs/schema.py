@@ -17,13 +17,13 @@ T = TypeVar("T", bound=BaseModel)
 DEFAULT_NAME = "sweep"
 
 
-class Table(BaseModel):
+class FileTable(BaseModel):
     """Base class of the tables of a study file."""
 
     model_config: ClassVar[ConfigDict] = ConfigDict(extra="forbid", frozen=True)
 
 
-class VaryTable(Table):
+class VaryTable(FileTable):
     """Table of a parameter."""
 
     fields: list[Text] = Field(default=[], description="fields of the mechanism's file, all given the same number")
@@ -35,7 +35,7 @@ class VaryTable(Table):
     whole: Yes = Field(default=False, description="true for whole numbers only")
 
 
-class SamplingTable(Table):
+class SamplingTable(FileTable):
     """Table of the sampling of the parameters' ranges."""
 
     kind: Literal["grid", "list", "random", "sobol"] = Field(
@@ -45,7 +45,7 @@ class SamplingTable(Table):
     seed: Count = Field(default=0, description="a non-negative whole number")
 
 
-class IntegrationTable(Table):
+class IntegrationTable(FileTable):
     """Table of integration options; the defaults are those of the mechanism's [study] table, then of the program."""
 
     method: Text | None = Field(default=None, description="the method of integration: paraflex methods lists them")
@@ -61,7 +61,7 @@ class IntegrationTable(Table):
     parameters: dict[str, Number] = Field(default={}, description="the method's own parameters")
 
 
-class SweepTable(Table):
+class SweepTable(FileTable):
     """Contents of a study file."""
 
     name: Text = Field(default=DEFAULT_NAME, description="a name for the study")

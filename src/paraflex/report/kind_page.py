@@ -30,7 +30,7 @@ def kind_page(data: xr.Dataset) -> Page:
         title=str(data.attrs.get("mechanism", kind)),
         kind=kind,
         verdict=verdict_word(data) if "status" in data else "",
-        facts=[(name, str(data.attrs[name])) for name in ("paraflex_version",) if name in data.attrs],
+        facts=[("paraflex", str(data.attrs.get("paraflex_version", "")))],
         command=command_line(asked(data)),
         figures=[tile for module in modules if hasattr(module, "tiles") for tile in module.tiles(data)],
         more=sections(tables),

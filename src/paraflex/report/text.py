@@ -5,73 +5,13 @@ from __future__ import annotations
 import json
 import math
 import re
-import sys
 from collections.abc import Iterable, Mapping, Sequence
 from html import escape
 
 from paraflex.figures.tables import Table
-from paraflex.formatting import display_unit, display_units, raised, text_symbol, typeset
-from paraflex.units import DisplayUnit
+from paraflex.formatting import text_symbol, typeset
 
-# Range of magnitudes written without powers of ten.
-_SMALLEST_PLAIN, _LARGEST_PLAIN = 1e-3, 1e5
-# Share of the magnitude of its terms below which a difference is a rounding error.
-_ROUNDING = 16.0 * sys.float_info.epsilon
-NO_VALUE = "–"
 _WORD_CLASS, _SORTABLE = ' class="words"', ' class="sortable"'
-
-
-def number(value: float | None, factor: float = 1.0, *, beside: float = 0.0) -> str:
-    """Format a value times a factor with three digits: "0.377", "1.20 × 10⁻⁵"; a dash if there is none.
-
-    Parameters
-    ----------
-    value : float, optional
-        Value to format.
-    factor : float
-        Factor of the value, such as a change of units.
-    beside : float
-        Magnitude of the quantities whose difference or part the value is; a value within their rounding is "0".
-    """
-    if value is None or not math.isfinite(factor * value):
-        return NO_VALUE
-    if value == 0.0 or (math.isfinite(beside) and abs(value) < _ROUNDING * beside):
-        return "0"
-    value = factor * value
-    if not _SMALLEST_PLAIN <= abs(value) < _LARGEST_PLAIN:
-        digits, power = f"{value:.2e}".split("e")
-        return f"{digits} × 10{raised(int(power))}".replace("-", "−")
-    # Numbers of four or five digits are written as whole numbers.
-    text = f"{value:.0f}" if abs(value) >= 1000.0 else f"{value:#.3g}".rstrip(".")
-    return text.replace("-", "−")
-
-
-def common_unit(unit: str, values: Iterable[float | None], *, beside: float = 0.0) -> DisplayUnit:
-    """Return the unit in which all values are written without powers of ten, else the unit of the largest.
-
-    Values and `beside` are as for `number`.
-    """
-    known = [abs(one) for one in values if one is not None and math.isfinite(one) and abs(one) > _ROUNDING * beside]
-    if not known:
-        return display_unit(unit, 0.0)
-    least, most = min(known), max(known)
-    fits = (
-        one
-        for one in display_units(unit)
-        if least * one.factor >= _SMALLEST_PLAIN and most * one.factor < _LARGEST_PLAIN
-    )
-    return next(fits, display_unit(unit, most))
-
-
-def quantity(value: float, unit: str, shown: DisplayUnit | None = None) -> str:
-    """Format a value in a suitable unit, or in a given one: "0.377 mm"."""
-    shown = shown or display_unit(unit, value)
-    return f"{number(value, shown.factor)} {shown.name}"
-
-
-def count(value: float | None) -> str:
-    """Format a whole number with separated thousands: "43 708"; a dash if there is none."""
-    return NO_VALUE if value is None or not math.isfinite(value) else f"{int(value):,}".replace(",", "\u2009")
 
 
 def table(

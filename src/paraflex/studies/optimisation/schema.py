@@ -6,7 +6,7 @@ from typing import Literal
 
 from pydantic import Field
 
-from paraflex.designs.schema import SweepTable, Table, VaryTable, Yes
+from paraflex.designs.schema import FileTable, SweepTable, VaryTable, Yes
 from paraflex.files.schema import Count, Number, NumberOfFields, Text
 
 MethodName = Literal["slsqp", "trust-constr", "l-bfgs-b", "nelder-mead", "differential-evolution", "optuna"]
@@ -21,14 +21,14 @@ class ParameterTable(VaryTable):
     )
 
 
-class AtMostTable(Table):
+class AtMostTable(FileTable):
     """A metric with a limit."""
 
     metric: Text = Field(description="a metric; one per motor as NAME.MOTOR")
     value: NumberOfFields = Field(description="its limit, in the unit of the metric")
 
 
-class ObjectiveTable(Table):
+class ObjectiveTable(FileTable):
     """The objective."""
 
     minimise: dict[str, Number] = Field(description="metrics and their weights")
@@ -39,7 +39,7 @@ class ObjectiveTable(Table):
     at_most: list[AtMostTable] = Field(default=[], description="limits, [[objective.at_most]]")
 
 
-class TargetTable(Table):
+class TargetTable(FileTable):
     """A number to be reproduced."""
 
     metric: Text = Field(description="a metric; one per motor as NAME.MOTOR")
@@ -50,7 +50,7 @@ class TargetTable(Table):
     relative: Yes = Field(default=True, description="false for the difference itself, not divided by the value")
 
 
-class SearchTable(Table):
+class SearchTable(FileTable):
     """Settings of the search."""
 
     method: MethodName | None = Field(
