@@ -15,7 +15,7 @@ import subprocess
 import sys
 from pathlib import Path
 
-from paraflex.figures.catalogue import Figure as CatalogueFigure
+from paraflex.figures.entry import Figure as CatalogueFigure
 from paraflex.plots.catalogue import CATALOGUE
 from paraflex.plots.planned import drawings, figures_of
 from paraflex.plots.save import write_figures

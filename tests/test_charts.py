@@ -63,7 +63,8 @@ def test_units_are_chosen_by_size():
     assert display_unit("m", [2e-4, -1e-5]).name == "mm"
     assert display_unit("m", [9e-5]).name == "µm"
     assert display_unit("Pa", [3e8]).name == "MPa"
-    assert display_unit("N", [1e9]) == DisplayUnit("N", 1.0)
+    assert display_unit("N", [1e9]).name == "kN"
+    assert display_unit("kg", [1e9]) == DisplayUnit("kg", 1.0)
     assert common_unit("N/m", [1080.0, 5.3e6]).name == "N/mm"
     assert common_unit("m", [None, np.nan, 2e-6, 5e-5]).name == "µm"
     assert quantity(3.77e-4, "m") == "0.377 mm"

@@ -146,7 +146,7 @@ def test_figures_and_pages_are_ranked_by_the_headline(paper_run):
     page = tracking_page(tracking_dataset(paper_run))
     assert page.figures[0][:2] == ("least RMS error during the motion", "0.505 mm")
     text = render(page)
-    assert "Error and largest: during the motion." in text
+    assert "Error, RMS, and the largest one: during the motion." in text
     assert "motors free" in text
 
 

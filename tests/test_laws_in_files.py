@@ -207,9 +207,11 @@ def test_computed_torque_goes_on_from_what_was_saved(model, task):
         sim.restore(saved)
         assert controller.started is started
         assert controller.law is model.controllers["ct"].law
-        ends.append(sim.run(warning=False).controllers[0].wanted)
+        ends.append(sim.run(warning=False).controllers[0].requested)
     assert np.array_equal(*ends)
-    assert np.array_equal(ends[0], Simulation(task, mode="++++").run(controller, warning=False).controllers[0].wanted)
+    assert np.array_equal(
+        ends[0], Simulation(task, mode="++++").run(controller, warning=False).controllers[0].requested
+    )
 
 
 def test_no_second_torque_beside_the_whole_one(model, task):
@@ -233,7 +235,7 @@ def test_no_second_torque_beside_the_whole_one(model, task):
 
 def test_feedback_beside_the_whole_torque_adds_to_it(model, task):
     run = simulate_controlled(task, "++++", [model.controllers["ct"], ControllerDescription("pd", pf.JointPID(5.0), T)])
-    whole, more = (one.given for one in run.controllers)
+    whole, more = (one.applied for one in run.controllers)
     assert np.max(np.abs(more)) > 0.0
     assert run.applied[2:] == pytest.approx((whole + more)[1:], abs=1e-12)
 

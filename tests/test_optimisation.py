@@ -96,7 +96,7 @@ def test_a_limit_nothing_holds_is_named_with_its_unit(capsys):
         metrics={"stress_max": 2.5e7, "total_mass": 1.0}, start_metrics={"stress_max": 3e7, "total_mass": 2.0},
         goal={"limits": (("stress_max", 1e7), ("total_mass", 1.5))},
     )  # fmt: skip
-    report({}, Console(width=100), found)
+    report(Console(width=100), found)
     lines = capsys.readouterr().out.splitlines()
     assert next(line.split() for line in lines if "stress_max" in line) == ["stress_max", "MPa", "30", "25"]
     assert [line for line in lines if line.startswith("limit")] == [

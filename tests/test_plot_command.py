@@ -447,7 +447,7 @@ def test_response_curves_show_the_table(results: Path) -> None:
     np.testing.assert_allclose(points, np.column_stack([1e3 * runs.parameters["x"], runs.metrics["total_mass"]]))
     np.testing.assert_allclose(points[:, 1], 3.0 + 0.1 * points[:, 0] + runs.parameters["y"])
     assert rows[0].get_ylabel() == "mass [kg]"
-    assert [axes.get_xlabel() for axes in rows] == ["x [mm]", "y [kg]"]
+    assert [axes.get_xlabel() for axes in rows] == ["$x$ [mm]", "$y$ [kg]"]
 
 
 def test_the_front_is_of_what_no_other_design_is_better_than(results: Path) -> None:

@@ -45,7 +45,7 @@ UNITS = {
     "tracking_errors": {"mm", "s"},
     "compared_links": {"rad", "rad/s", "s"},
     "compared_paths": {"mm"},
-    "model_distances": {"µm", "s"},
+    "model_distances": {"mm", "µm", "s"},
     "motion_overview": {"rad", "rad/s", "J", "s"},
 }
 # Of studies of many designs, from their results as files hold them.

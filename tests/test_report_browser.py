@@ -9,6 +9,7 @@ from playwright.sync_api import Browser, Page
 
 from colours import APART, colour_distance
 from conftest import DESKTOP, PHONE, is_ours, page_asks
+from paraflex.figures.charts import Axis
 from paraflex.plots.themes import THEMES
 from paraflex.report import Chart, Curve, Page as ReportPage, Panel, save_page, tracking_page, verification_page
 from reports import FAILED, MODES, tracked, verified
@@ -526,18 +527,9 @@ def test_models_of_a_verification_are_overlaid_and_their_buttons_fade_beside_a_p
     assert "goes-on" not in buttons.get_attribute("class")
 
 
-def test_parallel_coordinates_are_drawn_too(opened, tmp_path):
-    dimensions = [{"label": "x", "values": [1, 2]}, {"label": "y", "values": [3, 4]}]
-    chart = Chart("all", "All", "", figure={"data": [{"type": "parcoords", "dimensions": dimensions}], "layout": {}})
-    save_page(ReportPage("a", "sweep", panels=[Panel("All", [chart])]), tmp_path / "a.html")
-    page = opened(tmp_path / "a.html")
-    page.locator("#chart-all").scroll_into_view_if_needed()
-    page.wait_for_function("document.querySelector('#chart-all .parcoords')")
-
-
 def test_more_than_six_charts_of_a_panel_are_folded_and_drawn_once_they_are_opened_or_printed(opened, tmp_path):
     time = [0.0, 0.5, 1.0]
-    lines = [Chart(f"c{k}", f"Chart {k}", "y", [Curve("a", [0.0, k, 1.0])]) for k in range(8)]
+    lines = [Chart(f"c{k}", f"Chart {k}", Axis("y"), [Curve("a", [0.0, k, 1.0])]) for k in range(8)]
     save_page(ReportPage("a", "run", panels=[Panel("Six", lines[:6]), Panel("Two more", lines)], time=time, runs=[""]),
               tmp_path / "a.html")  # fmt: skip
     page = opened(tmp_path / "a.html")

@@ -153,7 +153,7 @@ def test_the_best_runs_are_made_again_and_move(finished, page, html):
     # The first run's error over time has the RMS that the table tells.
     chart = chart_of(page, "errors")
     error = 1e-3 * rows_of(page["series"])[chart["curves"][0]["y"]]
-    if chart["y"].endswith("[µm]"):
+    if chart["y"][0].endswith("[µm]"):
         error *= 1e-3
     # The rise from the start at rest is left out: nothing beside the rest.
     assert np.sqrt(np.nansum(error**2) / error.size) == pytest.approx(best["tracking_rms"], rel=1e-4)

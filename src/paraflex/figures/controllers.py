@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from paraflex.figures.catalogue import figure
 from paraflex.figures.charts import DOTTED, Array, Axis, Chart, Curve, look, stairs
+from paraflex.figures.entry import figure
 from paraflex.figures.loads import run_columns
 from paraflex.figures.runs import after_motion
 from paraflex.figures.selection import names_of

@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 
 from paraflex.campaign import read_tables
 from paraflex.errors import InputError, suggestion
-from paraflex.figures.catalogue import figure
 from paraflex.figures.charts import Axis, Chart, Curve, Mark, is_wide, look, stairs
+from paraflex.figures.entry import figure
 from paraflex.figures.selection import place_of
 from paraflex.figures.tables import Column, Table
 from paraflex.formatting import NO_VALUE, axis_unit, text_symbol

@@ -8,8 +8,8 @@ from collections.abc import Iterator
 import numpy as np
 import xarray as xr
 
-from paraflex.figures.catalogue import figure
 from paraflex.figures.charts import DOTTED, PLAIN_LOOK, Array, Axis, Chart, Curve, Look, look
+from paraflex.figures.entry import figure
 from paraflex.figures.selection import names_of
 from paraflex.figures.shapes import figure_of
 from paraflex.figures.tables import Column, Table

@@ -7,8 +7,8 @@ from collections.abc import Iterator
 import numpy as np
 import xarray as xr
 
-from paraflex.figures.catalogue import figure
 from paraflex.figures.charts import Array, Axis, Chart, Curve, Mark, is_wide, look
+from paraflex.figures.entry import figure
 from paraflex.figures.selection import names_of
 from paraflex.figures.tables import Column, Table
 from paraflex.results.metrics import METRICS, VALIDITY, metric_label

@@ -11,8 +11,8 @@ import numpy as np
 import xarray as xr
 
 from paraflex.arrays import Complex
-from paraflex.figures.catalogue import NOTHING, figure
 from paraflex.figures.charts import DASHED, DOTTED, N_COLOURS, PLAIN_LOOK, Array, Axis, Chart, Curve, Look, Span, look
+from paraflex.figures.entry import NOTHING, figure
 from paraflex.figures.selection import names_of, place_of
 from paraflex.figures.tables import Column, Table
 from paraflex.formatting import NO_VALUE, number, text_symbol

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from paraflex.figures.catalogue import figure
 from paraflex.figures.charts import DOTTED, Axis, Chart, Curve, look
+from paraflex.figures.entry import figure
 from paraflex.figures.runs import followed, of_names, stopped_runs
 from paraflex.figures.selection import names_of
 from paraflex.figures.tables import Cell, Column, Table

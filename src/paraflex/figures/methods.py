@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from paraflex.figures.catalogue import figure
 from paraflex.figures.charts import Axis, Chart, Curve, Look, Mark, Span
+from paraflex.figures.entry import figure
 from paraflex.figures.tables import Column, Table
 from paraflex.formatting import number
 

@@ -7,8 +7,8 @@ from dataclasses import replace
 
 import xarray as xr
 
-from paraflex.figures.catalogue import figure
 from paraflex.figures.charts import Axis, Chart, Curve, look
+from paraflex.figures.entry import figure
 from paraflex.figures.run_motion import ANGLE, ANGLES, RATES, energy_chart, moving_points, points_of
 from paraflex.figures.runs import followed, ranges, stopped_runs
 from paraflex.figures.selection import names_of

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from paraflex.figures.catalogue import NOTHING, figure
 from paraflex.figures.charts import PLAIN_LOOK, Axis, Chart, Curve, Look, Span, look
+from paraflex.figures.entry import NOTHING, figure
 from paraflex.figures.linear import FREQUENCY
 from paraflex.figures.selection import names_of
 from paraflex.figures.tables import Cell, Column, Table

@@ -10,8 +10,8 @@ import numpy as np
 import xarray as xr
 
 from paraflex.errors import InputError
-from paraflex.figures.catalogue import figure
 from paraflex.figures.charts import DOTTED, Array, Axis, Chart, Curve, Look, look
+from paraflex.figures.entry import figure
 from paraflex.figures.runs import compared, followed, of_names, ranges, run_names, stopped_runs
 from paraflex.figures.selection import names_of, point_number
 from paraflex.formatting import peak, text_symbol
@@ -51,7 +51,8 @@ def link_deflections(data: xr.Dataset) -> Iterator[Chart]:
 
 @figure(
     "axial and transverse displacement and slope of links' ends (Fig. 13)", heading=_LINKS, takes="mode",
-    written_as="tip_deflections", panels="choices", height=34.0, variables=("tip_axial", "tip_slope"),
+    written_as="tip_deflections", written_with=("end_effector_desired",), panels="choices", height=34.0,
+    variables=("tip_axial", "tip_slope"),
     defaults=lambda data: {"bodies": most_deflected(data)},
 )  # fmt: skip
 def tip_deflections(data: xr.Dataset, bodies: Sequence[str] | None = None) -> Iterator[Chart]:
@@ -108,7 +109,7 @@ def most_deflected(data: xr.Dataset) -> list[str]:
 
 @figure(
     "angle, speed and acceleration of links, desired and actual (Fig. 14)", heading=_LINKS, takes="mode",
-    written_as="link_motions", panels="choices", height=21.5,
+    written_as="link_motions", written_with=("angle_desired",), panels="choices", height=21.5,
 )  # fmt: skip
 def link_motions(data: xr.Dataset) -> Iterator[Chart]:
     """Yield charts of angle, angular velocity and angular acceleration of every link, desired and actual (Fig. 14)."""

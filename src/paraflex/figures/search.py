@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from paraflex.figures.catalogue import figure
 from paraflex.figures.charts import Array, Axis, Chart, Curve, Look, Mark, is_wide, look, stairs
 from paraflex.figures.designs import column_label
+from paraflex.figures.entry import figure
 from paraflex.figures.tables import Column, Table, in_row_units
 from paraflex.formatting import number
 from paraflex.units import DisplayUnit

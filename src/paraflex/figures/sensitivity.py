@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 
 from paraflex.errors import InputError
-from paraflex.figures.catalogue import figure
 from paraflex.figures.charts import Axis, Chart, Curve, look
 from paraflex.figures.designs import column_label
+from paraflex.figures.entry import figure
 from paraflex.figures.tables import Column, Table, in_row_units
 from paraflex.formatting import number, text_symbol
 

@@ -7,8 +7,8 @@ from collections.abc import Iterator
 import numpy as np
 import xarray as xr
 
-from paraflex.figures.catalogue import figure
 from paraflex.figures.charts import Axis, Chart
+from paraflex.figures.entry import figure
 from paraflex.figures.runs import followed
 from paraflex.results.sensors import READING, SENSOR, sensor_units
 from paraflex.units import DisplayUnit

@@ -12,8 +12,8 @@ import numpy as np
 import xarray as xr
 
 from paraflex.errors import InputError
-from paraflex.figures.catalogue import figure
 from paraflex.figures.charts import DASHED, DOTTED, Axis, Chart, Curve, Look, look
+from paraflex.figures.entry import figure
 from paraflex.figures.run_motion import actual_name, effort_axis, start_mark
 from paraflex.figures.runs import after_motion, compared, followed, ranges, round_magnification, stopped_runs
 from paraflex.figures.selection import moving_directions, names_of, of_point, samples

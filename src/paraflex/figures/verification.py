@@ -11,8 +11,8 @@ import numpy as np
 import xarray as xr
 
 from paraflex.errors import InputError
-from paraflex.figures.catalogue import figure
 from paraflex.figures.charts import Array, Axis, Chart, Curve, look
+from paraflex.figures.entry import figure
 from paraflex.figures.run_motion import most_deflected
 from paraflex.figures.runs import after_motion, round_magnification
 from paraflex.figures.selection import names_of

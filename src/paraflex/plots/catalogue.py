@@ -8,7 +8,8 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from paraflex.figures.catalogue import Figure, figures_of_kind
+from paraflex.figures.catalogue import figures_of_kind
+from paraflex.figures.entry import Figure
 from paraflex.folders.kinds import RESULT_KINDS
 
 _DRAWINGS: Mapping[str, Figure] = {

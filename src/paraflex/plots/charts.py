@@ -15,8 +15,9 @@ from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
 
 from paraflex.arguments import checked_arguments
 from paraflex.errors import InputError
-from paraflex.figures.catalogue import Figure as CatalogueFigure, all_figures, prepared
+from paraflex.figures.catalogue import all_figures
 from paraflex.figures.charts import Axis, Chart, Curve, is_logarithmic, joined, symmetrical_numbers
+from paraflex.figures.entry import Figure as CatalogueFigure, prepared
 from paraflex.figures.selection import default_mode, names_of, prototype_pair
 from paraflex.formatting import ROUNDING, logarithmic_number, peak
 from paraflex.plots.given import drawn
@@ -91,6 +92,9 @@ def plotting_function(name: str) -> Callable[..., Figure]:
         if "models" in chosen and models is None:
             models = prototype_pair(data)
         found = prepared(data, mode, models)
+        for lacking in (one for one in entry.variables if one not in found):
+            if not isinstance(found, xr.Dataset):
+                raise KeyError(lacking)
         charts = entry.describe(found, **{**entry.defaults(found), **options}) if entry.has_variables(found) else []
         if not charts:
             raise InputError(entry.missing[0], field="figure", value=name, remedy=entry.missing[1])

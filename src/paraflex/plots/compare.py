@@ -9,7 +9,7 @@ from matplotlib.figure import Figure
 
 from paraflex.arguments import checked_arguments
 from paraflex.figures import comparison as described
-from paraflex.figures.catalogue import Figure as CatalogueFigure
+from paraflex.figures.entry import Figure as CatalogueFigure
 from paraflex.plots.charts import print_figure
 from paraflex.plots.planned import PlannedFigure
 from paraflex.plots.save import write_figures

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from paraflex import plots
 from paraflex.errors import InputError, suggestion
-from paraflex.figures.catalogue import Figure as CatalogueFigure
+from paraflex.figures.entry import Figure as CatalogueFigure
 from paraflex.figures.selection import default_mode, names_of, place_of, point_number, prototype_pair
 from paraflex.plots.catalogue import CATALOGUE, figure_names
 

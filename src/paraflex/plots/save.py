@@ -63,7 +63,7 @@ def save_figures(results: xr.Dataset | Mapping[str, Any], folder: str | Path, mo
     written: list[Path] = []
     with added_to(folder) as new:
         for figure in figures_of(source):
-            if not figure.written_as:
+            if not figure.is_written(source.data):
                 continue
             for drawing in drawings(source, figure, [mode] if mode is not None and figure.takes == "mode" else ()):
                 one_of_many = figure.takes in ("models", "run")

@@ -220,7 +220,7 @@ def _chart(chart: Chart, series: Series, time: int) -> dict[str, Any]:
         "curves": [curve(one) for one in chart.curves], "choices": list(chart.choices), "choosing": chart.choosing,
         "log": is_logarithmic(chart.axis(None), ys), "log_x": is_logarithmic(chart.x, xs),
         "equal": chart.equal, "over_time": chart.over_time, "note": chart.note, "layout": _layout(chart, units),
-        "figure": None, "drawer": getattr(chart, "drawer", ""),
+        "drawer": getattr(chart, "drawer", ""),
         "pickers": [picker._asdict() for picker in getattr(chart, "pickers", ())],
     }  # fmt: skip
 

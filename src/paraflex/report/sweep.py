@@ -12,9 +12,10 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from paraflex.figures import search
-from paraflex.figures.catalogue import page_panels, prepared
+from paraflex.figures.catalogue import page_panels
 from paraflex.figures.charts import Panel
 from paraflex.figures.designs import DesignTable, column_label, failure_table
+from paraflex.figures.entry import prepared
 from paraflex.figures.run_motion import strain_chart
 from paraflex.figures.runs import thinned
 from paraflex.figures.search import IDENTIFICATION

@@ -190,7 +190,7 @@ class LQGLaw:
     design : LQGDesign
         Design of the law.
     period, delay, inputs, outputs, state_space
-        Those of the design.
+        Sampling, readings, torques and matrices of the design.
     holding_torques : (motors,) array
         Holding torques of the design, part of its torques; zero where planned torques act as well [N m, N].
     """

@@ -24,8 +24,8 @@ const charts = (() => {
     return Array.isArray(label) ? label[label.length > 1 ? chart.choice : 0] : label;
   };
 
-  const isOwn = (chart) => Boolean(chart.description.figure || chart.description.drawer);
-  const ownFigure = (chart) => (chart.description.drawer ? designs.figure(chart) : chart.description.figure);
+  const isOwn = (chart) => Boolean(chart.description.drawer);
+  const ownFigure = (chart) => (isOwn(chart) ? designs.figure(chart) : null);
 
   function traces(chart) {
     const own = ownFigure(chart);
@@ -128,7 +128,7 @@ const charts = (() => {
     if (first) {
       chart.plot.on("plotly_afterplot", () => moveCursor(chart));
       if (chart.description.drawer) chart.plot.on("plotly_click", (event) => designs.choose(event.points[0]));
-      else if (chart.description.over_time && !chart.description.figure) chart.plot.on("plotly_click", (event) => player.seek(event.points[0].x));
+      else if (chart.description.over_time) chart.plot.on("plotly_click", (event) => player.seek(event.points[0].x));
     }
     drawLegend(chart);
     moveCursor(chart);
@@ -204,11 +204,11 @@ const charts = (() => {
   // smaller as a whole where it is wider, and so are parallel coordinates, once they are no wider than their names need.
   function fitToPaper(chart) {
     if (!chart.plot._fullLayout) return;
-    const { drawer, equal, figure } = chart.description;
+    const { drawer, equal } = chart.description;
     if (drawer === "parallel") {
       const needed = Math.max(PAPER, parseFloat(chart.plot.style.minWidth));
       Plotly.relayout(chart.plot, { width: Math.min(chart.plot._fullLayout.width, needed) });
-    } else if (!equal && !figure) {
+    } else if (!equal && !drawer) {
       Plotly.relayout(chart.plot, { width: PAPER, height: LOW, "yaxis.title.font.size": LOW_TITLE });
       chart.plot.parentElement.style.height = `${LOW}px`;
       return;
@@ -227,7 +227,7 @@ const charts = (() => {
 
   function make(description) {
     const plot = element("div", { style: "width:100%;height:100%" });
-    const kind = description.drawer ? ` own ${description.drawer}` : description.figure ? " own" : description.equal ? " square" : "";
+    const kind = description.drawer ? ` own ${description.drawer}` : description.equal ? " square" : "";
     const holder = element("div", { class: `plot${kind}`, role: "img", "aria-label": `${description.title}: ${[].concat(description.y)[0]} over ${description.x}` }, plot);
     const chart = { description, plot, choice: 0, picked: description.pickers.map((picker) => picker.chosen), hidden: new Set(), dots: [], drawn: false, stale: true, inView: false };
     const header = element("header", {}, element("h3", {}, description.title));
