@@ -33,7 +33,7 @@ def test_all_ten_kinds_of_additions_are_made_as_the_page_says(tmp_path):
         else:
             assert not file.exists()
             file.write_text(block.text, encoding="utf-8")
-    assert ran + check(waiting, tmp_path) == 18
+    assert ran + check(waiting, tmp_path) == 20
 
 
 def check(blocks, folder):

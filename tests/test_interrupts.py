@@ -73,7 +73,7 @@ LATE = """
 import sys
 class Slow:
     def find_spec(self, name, *_):
-        if name == "paraflex.late":
+        if name == "paraflex.not_there":
             print("importing", flush=True)
             try:
                 __import__("time").sleep(0.5)
@@ -84,7 +84,7 @@ class Slow:
 sys.meta_path.insert(0, Slow())
 def work(request):
     try:
-        import paraflex.late
+        import paraflex.not_there
     except ImportError:
         pass
     __import__("time").sleep(600)

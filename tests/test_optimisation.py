@@ -94,7 +94,7 @@ def test_a_limit_nothing_holds_is_named_with_its_unit(capsys):
     found = SimpleNamespace(
         values={"x": 1.0}, start={"x": 2.0}, bounds={}, start_objective=1.0, objective=0.5, holds_limits=False,
         metrics={"stress_max": 2.5e7, "total_mass": 1.0}, start_metrics={"stress_max": 3e7, "total_mass": 2.0},
-        goal={"limits": (("stress_max", 1e7), ("total_mass", 1.5))},
+        goal={"limits": (("stress_max", 1e7), ("total_mass", 1.5))}, units={"stress_max": "Pa", "total_mass": "kg"},
     )  # fmt: skip
     report(Console(width=100), found)
     lines = capsys.readouterr().out.splitlines()

@@ -71,7 +71,7 @@ def test_one_table_has_all_paths_and_modes(two):
     for path, summary in summaries.items():
         (row,) = [row for row in rows if row[:2] == [path, "++"] and len(row) == 7]
         numbers = summary["modes"]["++"]
-        (unit,) = {"mm": 1e-3, "µm": 1e-6}.keys() & re.findall(r"\[(.*?)\]", done.stdout)
+        unit = re.search(r"\[(.m)\]", done.stdout)[1]
         error = {"mm": 1e-3, "µm": 1e-6}[unit] * float(row[2])
         assert error == pytest.approx(numbers[f"tracking_rms_{summary['error']}"], rel=1e-3)
         assert [float(one) for one in row[3:5]] == pytest.approx([*numbers["peak_torque"].values()], abs=0.006)
