@@ -29,9 +29,6 @@ _DECADE = 10.0
 _MOST_POWERS = 4
 
 
-Mark = Literal["", "ring", "cross", "square", "dot", "triangle", "diamond", "bar"]
-
-
 class Look(NamedTuple):
     """Look of a curve: index of one of eight colours, or None for the colour of text, and dashes.
 

@@ -23,15 +23,27 @@ from typing import Any
 
 import lazy_loader
 
-_attached, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)
+# Drawings by their modules; figures with charts are made by `charts`.
+_drawing, _, _drawings = lazy_loader.attach(__name__, submod_attrs={
+    "drawing": ["mechanism_drawing"], "equilibria": ["buckling_shapes", "deformed_shapes"], "maps": ["response_map"],
+    "mode_shapes": ["mode_shapes"], "parallel": ["parallel_coordinates"], "save": ["save_figures"],
+    "workspace": ["desired_path"],
+})  # fmt: skip
 
 
 def __getattr__(name: str) -> Any:
+    if name == "__all__":
+        return __dir__()
     try:
-        return _attached(name)
+        return _drawing(name)
     except AttributeError:
-        # A figure of the catalogue that the stub does not list.
         figure = getattr(import_module("paraflex.plots.charts"), name, None)
         if figure is None:
             raise
         return figure
+
+
+def __dir__() -> list[str]:
+    from paraflex.figures.catalogue import all_figures
+
+    return sorted({*_drawings, *all_figures()})
