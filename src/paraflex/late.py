@@ -26,7 +26,7 @@ class Late:
     def __init__(self) -> None:
         self.modules: tuple[str, ...] = ()
         self._functions = singledispatch(_unregistered)
-        self.register = self._functions.register
+        self.register: Any = self._functions.register
 
     def __call__(self, thing: object, *given: object) -> Any:
         """Call the function for the class of an object."""
@@ -37,4 +37,5 @@ class Late:
 
 
 # HTML of an object in notebooks; file of a mechanism, written to a path.
-view, save_file = Late(), Late()
+view: Late = Late()
+save_file: Late = Late()

@@ -39,8 +39,8 @@ class Runs:
     """
 
     def __init__(self, data: Mapping[str, xr.Dataset], failed: Mapping[str, Sequence[str]] | None = None) -> None:
-        self.data = list(data.values())
-        self.rows = [
+        self.data: list[xr.Dataset] = list(data.values())
+        self.rows: list[_Row] = [
             row for path, one in data.items() for row in (
                 *(_Row(path, mode, one.isel(mode=r)) for r, mode in enumerate(names_of(one, "mode"))),
                 *(_Row(path, mode, None) for mode in (failed or {}).get(path, ())),

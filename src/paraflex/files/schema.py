@@ -627,7 +627,10 @@ _WRITTEN[References | None] = _REFERENCE | None
 _CONTROLLER = create_model(
     "ControllerTable", __base__=_Table, **_fields_of(ControllerDescription, without=("name", "law"))
 )
-AnyControllerTable = _member_table(list(LAWS.values()), _CONTROLLER)
+if TYPE_CHECKING:
+    AnyControllerTable = Any
+else:
+    AnyControllerTable = _member_table(list(LAWS.values()), _CONTROLLER)
 
 
 class StudyDefaultsTable(_Table):
@@ -749,7 +752,7 @@ class ModelTable(_WithGroups):
     )
     mode: dict[str, list[Text]] = _optional("the motors of each actuation mode", {})
     path: dict[str, PathTable] = Field(default={})
-    controller: dict[str, AnyControllerTable] = Field(default={})  # pyright: ignore[reportInvalidTypeForm]
+    controller: dict[str, AnyControllerTable] = Field(default={})
     start: StartTable | None = None
     study: StudyDefaultsTable = StudyDefaultsTable()
     statics: StaticsTable = StaticsTable()

@@ -10,7 +10,7 @@ from collections.abc import Mapping
 
 from paraflex.figures.catalogue import figures_of_kind
 from paraflex.figures.entry import Figure
-from paraflex.folders.kinds import RESULT_KINDS
+from paraflex.folders.kinds import RESULT_KINDS, ResultKind
 
 _DRAWINGS: Mapping[str, Figure] = {
     one.name: one
@@ -40,11 +40,17 @@ _DRAWINGS: Mapping[str, Figure] = {
         Figure("parallel_coordinates", "parameters and metrics of every design on parallel axes", takes="designs"),
     )
 }
-# Figures of each kind of results that has any: those with charts, then drawings.
+
+
+def _figures(kind: ResultKind) -> tuple[Figure, ...]:
+    """Return the figures of a kind of results: those with charts, then drawings."""
+    return (*figures_of_kind(kind.name).values(), *(_DRAWINGS[name] for name in kind.drawings))
+
+
+# Figures of each kind of results that has any.
 CATALOGUE: Mapping[str, tuple[Figure, ...]] = {
-    kind: found for kind, each in RESULT_KINDS.items()
-    if (found := (*figures_of_kind(kind).values(), *(_DRAWINGS[name] for name in each.drawings)))
-}  # fmt: skip
+    name: _figures(kind) for name, kind in RESULT_KINDS.items() if kind.figures or kind.drawings
+}
 
 
 def figure_names() -> set[str]:

@@ -93,7 +93,8 @@ class CompiledInRun(StartedLaw):
         sizes = inputs, states, outputs
         if sizes not in entries:
             entries[sizes] = _entry(self._function, *sizes)
-        self._entry, self.states, self._outputs = entries[sizes], states, outputs
+        self._entry, self._outputs = entries[sizes], outputs
+        self.states: int = states
         name = getattr(function, "__name__", "")
         self.title: str = f"compiled {name if name.isidentifier() else 'function'}"
 

@@ -109,8 +109,8 @@ class Law(CheckedFields, ABC):
     whole_torque: ClassVar[bool] = False
     absolute: ClassVar[bool] = False
     reference: ClassVar[str | None] = None
-    # Without annotations, so that a subclass may have fields of these names.
-    inputs, outputs = _NO_NAMES, _NO_NAMES
+    inputs: ClassVar[Any] = _NO_NAMES
+    outputs: ClassVar[Any] = _NO_NAMES
 
     def __init_subclass__(cls, *, kind: str = "", title: str = "") -> None:
         super().__init_subclass__()

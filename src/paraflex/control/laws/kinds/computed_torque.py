@@ -90,7 +90,8 @@ class RigidInverse(StartedLaw):
     """Computed torque in a run, with gains Kp [1/s^2] and Kv [1/s] along a plan at the samples of a controller."""
 
     def __init__(self, plan: RigidMotion, plant: Plant, Kp: float, Kv: float, rates: BackwardDifference) -> None:
-        self._plan, self._Kp, self._Kv, self.rates = plan, Kp, Kv, rates
+        self._plan, self._Kp, self._Kv = plan, Kp, Kv
+        self.rates: BackwardDifference = rates
         self._start, self._period, self._joints = plant.state.time, plant.period, plant.inputs
         self._motors = [k for k, motor in enumerate(plan.mechanism.motors) if motor.name in plant.outputs]
         self._closure = PathClosure(plan.mechanism, 0.0, float(plan.t[-1]))
