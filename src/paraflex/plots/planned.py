@@ -146,9 +146,9 @@ def _of_modes(
         return [planned(f"{run['path']}_{run['mode']}", data, k) for k, run in runs if run["mode"] in chosen]
     if figure.takes == "models":
         return [planned(mode, data, mode, prototype_pair(data)) for mode in chosen]
-    if figure.takes == "mode" and source.kind != "motion":
+    if figure.takes == "mode" and chosen:
         return [planned(mode, data, mode) for mode in modes or [default_mode(data)]]
-    if modes and source.kind == "indices":
+    if modes and "indices" in data:
         data = data | {"indices": [row for row in data["indices"] if row["mode"] in modes]}
     elif modes:
         data = data.sel(mode=list(modes))
@@ -165,18 +165,17 @@ def _can_be_drawn(figure: CatalogueFigure, source: Source) -> bool:
 
 def _chosen(source: Source, modes: Sequence[str]) -> list[str]:
     """Return the requested modes, by default all; an empty list for results without modes."""
-    if source.kind in ("tracking", "verification", "linear", "laws"):
-        known = names_of(source.data, "mode")
-    elif source.kind == "sensitivity":
-        known = list(dict.fromkeys(run["mode"] for run in source.data["runs"]))
-    elif source.kind == "indices":
+    data, known = source.data, list[str]()
+    if "mode" in getattr(data, "dims", ()):
+        known = names_of(data, "mode")
+    elif isinstance(data, Mapping) and "runs" in data:
+        known = list(dict.fromkeys(run["mode"] for run in data["runs"]))
+    elif isinstance(data, Mapping) and "indices" in data:
         return list(modes)
-    elif modes:
+    if modes and not known:
         raise InputError(
             "this figure has no modes to choose from", field="--mode", value=modes[0], remedy="leave it out"
         )
-    else:
-        return []
     for mode in modes:
         place_of(mode, known, "mode", field="--mode")
     return list(modes) or known

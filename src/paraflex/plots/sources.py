@@ -24,9 +24,7 @@ class Source:
     Attributes
     ----------
     kind : str
-        Kind of results:
-        "tracking", "motion", "verification", "linear", "statics", "reduction", "laws", "methods", "sweep",
-        "optimisation", "identification", "indices", "sensitivity" or "modes".
+        Kind of results, a key of `RESULT_KINDS`.
     data : xarray.Dataset, mapping, list or DesignTable
         Data in the form that the functions of `paraflex.plots` take.
     folder : Path
