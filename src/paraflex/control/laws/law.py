@@ -5,7 +5,7 @@ from __future__ import annotations
 from abc import ABC, abstractmethod
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import MISSING, dataclass, field, fields, replace
-from typing import Any, ClassVar, Literal, Self
+from typing import TYPE_CHECKING, Any, ClassVar, Literal, Self
 
 import numpy as np
 
@@ -109,8 +109,12 @@ class Law(CheckedFields, ABC):
     whole_torque: ClassVar[bool] = False
     absolute: ClassVar[bool] = False
     reference: ClassVar[str | None] = None
-    inputs: ClassVar[Any] = _NO_NAMES
-    outputs: ClassVar[Any] = _NO_NAMES
+    if TYPE_CHECKING:
+        inputs: ClassVar[Any]
+        outputs: ClassVar[Any]
+    else:
+        # Without annotations, so that a subclass may have fields of these names in its own order.
+        inputs, outputs = _NO_NAMES, _NO_NAMES
 
     def __init_subclass__(cls, *, kind: str = "", title: str = "") -> None:
         super().__init_subclass__()
