@@ -131,6 +131,11 @@ def _origin(package: str, name: str) -> str:
         if isinstance(node, ast.ImportFrom) and any((alias.asname or alias.name) == name for alias in node.names):
             module = _module(package, node)
             return _origin(module, name) if (SOURCE / module.replace(".", "/")).is_dir() else f"{module}.{name}"
+    if package == "plots":
+        # A figure with charts is described where it is defined.
+        for file in (SOURCE / "figures").glob("*.py"):
+            if f"\ndef {name}(" in file.read_text(encoding="utf-8"):
+                return f"figures.{file.stem}.{name}"
     return f"{package}.{name}"
 
 
