@@ -11,7 +11,7 @@ import pytest
 import paraflex as pf
 from paraflex import plots
 from paraflex.figures.catalogue import figures_of_kind, page_panels
-from paraflex.figures.charts import Axis, Chart, Curve, Span, is_logarithmic, look
+from paraflex.figures.charts import Axis, Chart, Curve, Panel, Span, is_logarithmic, look
 from paraflex.figures.tables import Column, Table
 from paraflex.formatting import common_unit, display_unit, number, quantity, typeset
 from paraflex.plots.labels import mathematics
@@ -145,9 +145,34 @@ def test_what_a_page_and_print_draw_beside_curves():
         "bars", "Bars", Axis("", names=["one", "two"]), [Curve("a", [0.0, 1.0], [3.0, 5.0], look(0), mark="bar")],
         Axis("share"), spans=[Span(1.0, 2.0, "range")], levels=[0.5],
     )  # fmt: skip
-    from paraflex.report.page import Panel
-
     charts, _ = page_data([Panel("All", [chart])])
     assert charts["bars"]["layout"]["yaxis"]["ticktext"] == ["one", "two"]
     assert len(charts["bars"]["layout"]["shapes"]) == 2
     assert charts["bars"]["curves"][0]["mark"] == "bar"
+
+
+def test_whole_numbers_with_a_unit_are_converted_as_others_are():
+    column = Column("stiffness", [25000, 1000], "N/m", below=[5, None])
+    assert column.texts() == ["25\n0.005", "1"]
+    assert column.shown_unit.name == "N/mm"
+    assert Column("way", [1, 0.002], "m").texts() == ["1000", "2"]
+    assert Column("steps", [25000, np.int64(3)]).texts() == ["25000", "3"]
+
+
+def test_names_beside_charts_are_texts_and_short():
+    names = ["<b>bold</b>", "n" * 300]
+    chart = Chart(
+        "bars", "Bars", Axis("", names=names), [Curve("a", [0.0, 1.0], [3.0, 5.0], mark="bar")], Axis("share")
+    )
+    charts, _ = page_data([Panel("All", [chart])])
+    first, second = charts["bars"]["layout"]["yaxis"]["ticktext"]
+    assert first == "&lt;b&gt;bold&lt;/b&gt;"
+    assert len(second) < 50
+
+
+def test_charts_without_a_value_are_none():
+    assert not Chart("a", "A", Axis("y"), [Curve("", [np.nan, np.nan])]).has_values
+    assert not Chart("a", "A", Axis("y"), [Curve("", [0.0], [np.nan])]).has_values
+    assert not Chart("a", "A", Axis("y")).has_values
+    assert Chart("a", "A", Axis("y"), [Curve("", [np.nan, 1.0])]).has_values
+    assert typeset("inf") == "∞"

@@ -31,6 +31,8 @@ GREEK = {
     "omega": "ω", "eta": "η",
 }  # fmt: skip
 _CONTROL = re.compile(r"[\x00-\x08\x0b-\x1f\x7f]")
+# Number of letters up to which a name beside a chart is shown whole.
+_SHORT = 40
 # Longest name or unit that is shown whole.
 LONGEST = 200
 _POWER = re.compile(r"\^(-?\d+)")
@@ -105,6 +107,8 @@ def number(
 
 def typeset(text: str) -> str:
     """Return a text as pages print it: "1.2e-05" as "1.2 × 10⁻⁵", "m/s^2" as "m/s²", a minus sign, a dash for none."""
+    if text in ("inf", "-inf"):
+        return text.replace("inf", "∞").replace("-", "−")
     return "–" if text == NO_VALUE else _WRITTEN.sub(_typeset, superscripts(text))
 
 
@@ -251,6 +255,11 @@ def _parted(name: str) -> tuple[str, str]:
 def printable(text: str) -> str:
     """Return a text without control characters, which no SVG may hold, and cut if it is endless."""
     return _CONTROL.sub("\N{REPLACEMENT CHARACTER}", text if len(text) <= LONGEST else f"{text[:LONGEST]}...")
+
+
+def shortened(text: str) -> str:
+    """Return a name that fits beside a chart: its beginning if it is long."""
+    return text if len(text) <= _SHORT else f"{text[:_SHORT]}..."
 
 
 def is_signs(name: str) -> bool:

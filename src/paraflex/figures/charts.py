@@ -239,6 +239,15 @@ class Chart:
     of_runs: Sequence[str] = ()
 
     @property
+    def has_values(self) -> bool:
+        """Whether any curve has a point."""
+        return any(
+            bool(np.any(np.isfinite(np.asarray(curve.y, dtype=float))
+                        & (True if curve.x is None else np.isfinite(np.asarray(curve.x, dtype=float)))))
+            for curve in self.curves
+        )  # fmt: skip
+
+    @property
     def over_time(self) -> bool:
         """Whether the abscissa is the time of the runs."""
         return self.x is TIME

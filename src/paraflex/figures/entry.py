@@ -92,7 +92,7 @@ class Figure:
         """Check whether the results have the variables of the figure and, unless it is a drawing, any charts of it."""
         if self.charts is None or self.takes == "nothing":
             return self.has_variables(data)
-        return self.has_variables(data) and any(True for _ in self.charts(prepared(data)))
+        return self.has_variables(data) and any(chart.has_values for chart in self.charts(prepared(data)))
 
     def has_variables(self, data: Any) -> bool:
         """Check whether the results have the variables of the figure."""
@@ -103,9 +103,9 @@ class Figure:
         return bool(self.written_as) and all(name in data for name in self.written_with)
 
     def describe(self, data: Any, **options: Any) -> list[Chart]:
-        """Return the charts of results from `prepared`."""
+        """Return the charts of results from `prepared`; charts without any value are left out."""
         assert self.charts is not None
-        return list(self.charts(data, **options))
+        return [chart for chart in self.charts(data, **options) if chart.has_values]
 
 
 def prepared(data: Any, mode: str | None = None, models: Sequence[str] | None = None) -> Any:

@@ -124,6 +124,8 @@ def ranges(values: Array, axis: int = 0) -> Array:
 def risen(values: Array) -> Array:
     """Return a positive curve with NaN during its initial rise from zero, which would span many decades."""
     known = values[np.isfinite(values)]
+    if not known.size:
+        return values
     enough = np.nan_to_num(values) >= _RISEN * (float(np.median(known)) if known.size else 0.0)
     return np.where(np.arange(values.size) >= np.argmax(enough), values, np.nan)
 

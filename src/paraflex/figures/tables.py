@@ -67,7 +67,7 @@ class Column:
     def values(self) -> list[float]:
         """Numbers with a unit."""
         cells = (*self.cells, *(() if self.below_unit else self.below))
-        return [float(cell) for cell in cells if isinstance(cell, float)]
+        return [float(cell) for cell in cells if isinstance(cell, float) or (self.unit and _is_whole(cell))]
 
     @property
     def shown_unit(self) -> DisplayUnit:
@@ -79,7 +79,7 @@ class Column:
         factor = self.shown_unit.factor
 
         def text(cell: Cell) -> str:
-            if isinstance(cell, str | int | np.integer):
+            if isinstance(cell, str) or (_is_whole(cell) and not self.unit):
                 return str(cell)
             if cell is not None and abs(cell) < self.least:
                 return f"<{number(self.least, 1, factor=factor)}"
@@ -175,6 +175,11 @@ def in_row_units(columns: Sequence[Column], units: Sequence[str]) -> list[Column
              for unit, row in zip(shown, numbers, strict=True)]  # fmt: skip
     converted = [replace(column, cells=[row[k] for row in cells]) for k, column in enumerate(columns)]
     return [*converted, Column("unit", [NO_VALUE if unit.name in ("", "1") else unit.name for unit in shown])]
+
+
+def _is_whole(cell: object) -> bool:
+    """Check whether a cell is a whole number, which is written as it is if it has no unit."""
+    return isinstance(cell, int | np.integer) and not isinstance(cell, bool)
 
 
 def _is_known(cell: Cell) -> bool:

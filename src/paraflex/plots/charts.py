@@ -19,7 +19,7 @@ from paraflex.figures.catalogue import all_figures
 from paraflex.figures.charts import Axis, Chart, Curve, is_logarithmic, joined, symmetrical_numbers
 from paraflex.figures.entry import Figure as CatalogueFigure, prepared
 from paraflex.figures.selection import default_mode, names_of, prototype_pair
-from paraflex.formatting import ROUNDING, logarithmic_number, peak
+from paraflex.formatting import ROUNDING, logarithmic_number, peak, shortened
 from paraflex.plots.given import drawn
 from paraflex.plots.labels import mathematics
 from paraflex.plots.layout import (
@@ -229,7 +229,7 @@ def _member(chart: Chart, run: int | None, k: int) -> _Cell:
         names = {curve.name for curve in chart.curves if not curve.desired}
         return _Cell(chart, run, None, f"{names.pop()}: {chart.axis(None).name}" if len(names) == 1 else chart.title)
     choice = k + chart.overview
-    title, name = chart.choices[choice], chart.axis(choice).name
+    title, name = shortened(chart.choices[choice]), chart.axis(choice).name
     return _Cell(chart, run, choice, "" if title == name else f"{title}: {name}" if name else title)
 
 
@@ -257,7 +257,7 @@ def _draw(panel: Axes, cell: _Cell, time: Any, most: int, *, named: bool = True)
         low, high = units.x.factor * span.low, units.x.factor * span.high
         panel.axvspan(low, min(high, panel.get_xlim()[1]), color=SHADE, linewidth=0.0, zorder=0.0, label=label)
     if axis.names:
-        list_lines(panel, axis.names if named else [""] * len(axis.names))
+        list_lines(panel, [shortened(name) for name in axis.names] if named else [""] * len(axis.names))
         for line in range(len(axis.names) - 1 if _marks(chart) > 1 else 0):
             panel.axhline(line + 0.5, color="0.85", linewidth=0.5, zorder=0.5)
     if axis.names or panel.get_xscale() == panel.get_yscale() == "log":

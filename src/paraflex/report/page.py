@@ -32,7 +32,7 @@ from paraflex.figures.charts import (
     symmetrical_numbers,
 )
 from paraflex.folders import added_to
-from paraflex.formatting import logarithmic_number, typeset
+from paraflex.formatting import logarithmic_number, shortened, typeset
 from paraflex.plots.themes import THEMES
 from paraflex.report.designs import Designs
 from paraflex.report.film import Animation
@@ -244,7 +244,9 @@ def _layout(chart: Chart, units: ShownUnits) -> dict[str, Any]:
     both = {"xaxis": (chart.x, units.x), "yaxis": (chart.axis(None), units.of(None))}
     out |= {key: _symmetrical(axis, unit) for key, (axis, unit) in both.items() if axis.linear_below}
     if names := chart.axis(None).names:
-        out["yaxis"] = {"tickvals": list(range(len(names))), "ticktext": list(names), "range": [len(names) - 0.4, -0.6]}
+        # Plotly reads tags in texts.
+        texts = [escape(shortened(name), quote=False) for name in names]
+        out["yaxis"] = {"tickvals": list(range(len(names))), "ticktext": texts, "range": [len(names) - 0.4, -0.6]}
     return out
 
 
