@@ -55,9 +55,10 @@ _DRAWABLE: Mapping[str, Callable[[Any], bool]] = {
 }
 
 
-def figures_of(source: Source) -> list[CatalogueFigure]:
-    """Return the figures that can be drawn of some results."""
-    return [figure for figure in CATALOGUE[source.kind] if _can_be_drawn(figure, source)]
+def figures_of(source: Source, *, written: bool = False) -> list[CatalogueFigure]:
+    """Return the figures that can be drawn of some results; only those that their command writes if `written`."""
+    figures = (one for one in CATALOGUE[source.kind] if not written or one.is_written(source.data))
+    return [figure for figure in figures if _can_be_drawn(figure, source)]
 
 
 def find_figure(source: Source, name: str) -> CatalogueFigure:

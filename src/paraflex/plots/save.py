@@ -62,9 +62,7 @@ def save_figures(results: xr.Dataset | Mapping[str, Any], folder: str | Path, mo
     source = Source(kind, results, folder)
     written: list[Path] = []
     with added_to(folder) as new:
-        for figure in figures_of(source):
-            if not figure.is_written(source.data):
-                continue
+        for figure in figures_of(source, written=True):
             for drawing in drawings(source, figure, [mode] if mode is not None and figure.takes == "mode" else ()):
                 one_of_many = figure.takes in ("models", "run")
                 stem = portable_name(f"{figure.written_as}_{drawing.of}" if one_of_many else figure.written_as)
