@@ -67,7 +67,8 @@ class Column:
     def values(self) -> list[float]:
         """Numbers with a unit."""
         cells = (*self.cells, *(() if self.below_unit else self.below))
-        return [float(cell) for cell in cells if isinstance(cell, float) or (self.unit and _is_whole(cell))]
+        kinds = (float, int, np.integer) if self.unit else (float,)
+        return [float(cell) for cell in cells if isinstance(cell, kinds) and not isinstance(cell, bool)]
 
     @property
     def shown_unit(self) -> DisplayUnit:
