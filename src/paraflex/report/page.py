@@ -209,8 +209,11 @@ def _chart(chart: Chart, series: Series, time: int) -> dict[str, Any]:
     def curve(one: Curve) -> dict[str, Any]:
         x = time if one.x is None else series.add(_placed(chart.x, units.x, one.x))
         y = series.add(_placed(chart.axis(one.choice), units.of(one.choice), one.y))
-        texts = list(map(typeset, one.texts))
-        return _fields(one, "look", "desired", "stopped") | one.look._asdict() | {"x": x, "y": y, "texts": texts}
+        own = {"x": x, "y": y} | ({"texts": list(map(typeset, one.texts))} if one.mark else {})
+        # What a plain line does not have is left out of the file.
+        left_out = () if one.mark else ("mark", "size", "faint", "thickness", "line", "texts")
+        left_out = left_out if one.quiet else (*left_out, "quiet")
+        return _fields(one, "look", "desired", "stopped", *left_out) | one.look._asdict() | own
 
     ys, xs = (joined(each) for each in (
         (one.y for one in chart.curves), (one.x for one in chart.curves if one.x is not None)
