@@ -8,14 +8,14 @@ import xarray as xr
 from rich.console import Console
 
 from paraflex.cli.tables import print_table
-from paraflex.figures.laws import profile_table
+from paraflex.figures.laws import law_table
 from paraflex.results.metrics import VALIDITY
 from paraflex.studies.law_comparison import LawComparison
 
 
 def print_laws(console: Console, result: LawComparison) -> None:
     """Print a row for each law in each mode, and reasons of those that failed or are doubtful."""
-    print_table(console, profile_table(result.data))
+    print_table(console, law_table(result.data))
     for line in (*_reasons(result), *_doubtful(result)):
         console.print(line, soft_wrap=True)
     if result.interrupted:

@@ -17,17 +17,14 @@ from paraflex.findings import DONE_STATUSES, Finding
 from paraflex.formatting import number as text_of, quantity
 
 if TYPE_CHECKING:
-    from paraflex.figures.tables import Table as DescribedInputs
-
     # Their import takes as long as all of `paraflex info`.
+    from paraflex.figures.tables import Table as DescribedTable
     from paraflex.studies import StudyResult
     from paraflex.tracking import TrackingTask
 
 
 # Gap between two columns, width at which headings are broken, and above which columns of words are [characters].
 _BETWEEN, _HEAD, _WRAPPED = 2, 9, 26
-# Torques below this share of the largest are rounding errors.
-_ROUNDING = 1e-9
 
 
 class _PlainConsole(Console):
@@ -133,7 +130,7 @@ def framed_table(title: str, headings: Iterable[str], right: Container[int] = ()
     return table
 
 
-def print_tables(console: Console, tables: Iterable[DescribedInputs]) -> None:
+def print_tables(console: Console, tables: Iterable[DescribedTable]) -> None:
     """Print tables that have rows below their titles, a title that several share only once."""
     title = None
     for shown in filter(None, tables):
@@ -141,7 +138,7 @@ def print_tables(console: Console, tables: Iterable[DescribedInputs]) -> None:
         title = shown.title
 
 
-def print_table(console: Console, shown: DescribedInputs, title: str | None = None) -> None:
+def print_table(console: Console, shown: DescribedTable, title: str | None = None) -> None:
     """Print a described table below its title; nothing if it has no rows.
 
     Columns that do not fit the console continue in further tables, behind the columns of words that name the rows.

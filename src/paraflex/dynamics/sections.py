@@ -176,8 +176,8 @@ def _sections(system: System) -> Sections | None:
     if not found:
         return None
     parts, x, sections, materials = zip(*found, strict=True)
-    fibres = [(one, made) for each, from_source in zip(sections, materials, strict=True)
-              for one, made in zip(each, from_source, strict=True)]  # fmt: skip
+    fibres = [(one, made) for each, made_of in zip(sections, materials, strict=True)
+              for one, made in zip(each, made_of, strict=True)]  # fmt: skip
     return Sections(
         bodies=tuple(part.body for part, places in zip(parts, x, strict=True) for _ in places),
         x=np.concatenate(x),

@@ -22,7 +22,6 @@ Takes = Literal["results", "mode", "models", "run", "designs", "nothing"]
 # Panels of the printed figure: one for each chart; one for each choice and chart; one for each run.
 Panels = Literal["charts", "choices", "runs"]
 
-
 # Problem of results without charts of a figure.
 NOTHING = "nothing to show in these results"
 

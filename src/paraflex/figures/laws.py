@@ -73,7 +73,7 @@ def metrics_of(data: xr.Dataset) -> tuple[str, ...]:
     return tuple(str(name) for name in data.data_vars if str(name).partition(".")[0] in METRICS)
 
 
-def profile_table(data: xr.Dataset) -> Table:
+def law_table(data: xr.Dataset) -> Table:
     """Return the table of all metrics, with a row for each law in each mode."""
     laws, modes = names_of(data, "law"), names_of(data, "mode")
     status = data["status"].transpose("mode", "law").values.ravel()

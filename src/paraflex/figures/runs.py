@@ -126,7 +126,7 @@ def risen(values: Array) -> Array:
     known = values[np.isfinite(values)]
     if not known.size:
         return values
-    enough = np.nan_to_num(values) >= _RISEN * (float(np.median(known)) if known.size else 0.0)
+    enough = np.nan_to_num(values) >= _RISEN * float(np.median(known))
     return np.where(np.arange(values.size) >= np.argmax(enough), values, np.nan)
 
 

@@ -92,9 +92,9 @@ def plotting_function(name: str) -> Callable[..., Figure]:
         if "models" in chosen and models is None:
             models = prototype_pair(data)
         found = prepared(data, mode, models)
-        for lacking in (one for one in entry.variables if one not in found):
-            if not isinstance(found, xr.Dataset):
-                raise KeyError(lacking)
+        lacking = [one for one in entry.variables if one not in found]
+        if lacking and not isinstance(found, xr.Dataset):
+            raise KeyError(lacking[0])
         charts = entry.describe(found, **{**entry.defaults(found), **options}) if entry.has_variables(found) else []
         if not charts:
             raise InputError(entry.missing[0], field="figure", value=name, remedy=entry.missing[1])

@@ -7,7 +7,7 @@ from typing import Any
 from paraflex.designs.sweep import SweepResult
 from paraflex.display import described, facts, page, sentence, table
 from paraflex.figures import search, sensitivity
-from paraflex.figures.laws import profile_table
+from paraflex.figures.laws import law_table
 from paraflex.figures.methods import tables
 from paraflex.figures.search import IDENTIFICATION
 from paraflex.figures.verification import model_table, path_extent
@@ -24,9 +24,6 @@ from paraflex.studies.optimisation.indices import IndicesResult
 from paraflex.studies.optimisation.result import SearchResult
 from paraflex.studies.sensitivities.study import Sensitivities
 from paraflex.studies.tracking import StudyResult
-
-# Largest number of rows shown of a table that could be long.
-_MOST_LISTED = 60
 
 
 @view.register(StudyResult)
@@ -139,9 +136,7 @@ def laws_html(comparison: LawComparison) -> str:
     why = [sentence(f"{law} in {mode}: {cell['reason']}") for law, one in found["laws"].items()
            for mode, cell in one["modes"].items() if "reason" in cell]  # fmt: skip
     state = _state(comparison.complete, comparison.interrupted)
-    return page(
-        f"{found['mechanism']}, control laws compared: {state}", described(profile_table(comparison.data)), *why
-    )
+    return page(f"{found['mechanism']}, control laws compared: {state}", described(law_table(comparison.data)), *why)
 
 
 def _search_facts(result: SearchResult) -> list[tuple[str, Any]]:
@@ -163,7 +158,3 @@ def _state(finished: bool, interrupted: bool) -> str:
 
 def _millimetres(metres: float | None) -> float | None:
     return None if metres is None else 1e3 * metres
-
-
-def _more(rows: int) -> str:
-    return sentence(f"and {rows - _MOST_LISTED} more rows") if rows > _MOST_LISTED else ""
