@@ -62,9 +62,7 @@ def table(headings: Sequence[str], rows: Iterable[Sequence[Any]], caption: str =
 def described(shown: Any) -> str:
     """Return a described table, see `figures.tables.Table`; an empty text if it has no rows."""
     numeric = [column.is_numeric for column in shown.columns]
-    heads = [
-        f"{name} [{unit}]" if unit and one else name for (name, unit), one in zip(shown.heads(), numeric, strict=True)
-    ]
+    heads = [" ".join(filter(None, one.head)) if one.is_numeric else one.name for one in shown.columns]
     rows, right = shown.texts(), [k for k, one in enumerate(numeric) if one]
     cells = [list(map(typeset, row)) for row in rows[:_MOST_LISTED]]
     more = sentence(f"and {len(rows) - _MOST_LISTED} more rows") if len(rows) > _MOST_LISTED else ""

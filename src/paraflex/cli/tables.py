@@ -145,14 +145,13 @@ def print_table(console: Console, shown: DescribedTable, title: str | None = Non
     """
     if not shown:
         return
-    heads = [[name, f"[{unit}]" if unit and column.is_numeric else unit]
-             for (name, unit), column in zip(shown.heads(), shown.columns, strict=True)]  # fmt: skip
+    heads = [list(column.head) for column in shown.columns]
     numeric, texts = [column.is_numeric for column in shown.columns], list(zip(*shown.texts(), strict=True))
     names = max(1, numeric.index(True)) if any(numeric) else 1
     widths = [max(map(len, "\n".join(cells).split("\n"))) for cells in texts]
     if sum(max(width, *map(len, head)) + _BETWEEN for width, head in zip(widths, heads, strict=True)) > console.width:
-        heads = [[*textwrap.wrap(name, max(width, _HEAD), break_long_words=False, break_on_hyphens=False), unit]
-                 for width, (name, unit) in zip(widths, heads, strict=True)]  # fmt: skip
+        heads = [[*textwrap.wrap(name, max(width, _HEAD), break_long_words=False, break_on_hyphens=False), below]
+                 for width, (name, below) in zip(widths, heads, strict=True)]  # fmt: skip
     widths = [max(width, *map(len, head)) + _BETWEEN for width, head in zip(widths, heads, strict=True)]
     first = sum(min(width, _WRAPPED) for width in widths[:names])
     for k, part in enumerate(_fitting(widths, names, console.width - first)):

@@ -75,6 +75,18 @@ class Column:
         """Unit in which the values are shown."""
         return self.shown or common_unit(self.unit, self.values, beside=self.beside)
 
+    @property
+    def printed_unit(self) -> str:
+        """Name of the unit in which numbers are shown, or the text below the heading of words; empty if none."""
+        unit = self.shown_unit.name if self.is_numeric else self.unit
+        return "" if unit == "1" else unit
+
+    @property
+    def head(self) -> tuple[str, str]:
+        """Heading, and what stands below it: the unit of numbers as "[mm]", the text of words, or nothing."""
+        unit = self.printed_unit
+        return self.name, f"[{unit}]" if unit and self.is_numeric else unit
+
     def texts(self) -> list[str]:
         """Return the cells as text."""
         factor = self.shown_unit.factor
@@ -126,8 +138,7 @@ class Table:
 
     def heads(self) -> list[tuple[str, str]]:
         """Return heading and unit of every column; the unit is empty if there is none."""
-        units = [column.shown_unit.name if column.is_numeric else column.unit for column in self.columns]
-        return [(column.name, "" if unit == "1" else unit) for column, unit in zip(self.columns, units, strict=True)]
+        return [(column.name, column.printed_unit) for column in self.columns]
 
     def texts(self) -> list[list[str]]:
         """Return the rows as text."""

@@ -37,6 +37,7 @@ from paraflex.plots.themes import THEMES
 from paraflex.report.designs import Designs
 from paraflex.report.film import Animation
 from paraflex.report.packing import Series
+from paraflex.report.text import pairs
 from paraflex.units import DisplayUnit
 from paraflex.writing import write_text
 
@@ -330,8 +331,7 @@ def _figures(figures: Sequence[tuple[str, str, str]]) -> str:
 
 def _origin(page: Page) -> str:
     """Return the section of the settings and the command behind the results."""
-    facts = "".join(f"<div><dt>{escape(name)}</dt><dd>{escape(value)}</dd></div>" for name, value in page.facts)
-    html = (f'<dl class="facts">{facts}</dl>' if facts else "") + _command(page.command)
+    html = pairs(page.facts, "facts") + _command(page.command)
     return _sections([(_ORIGIN, html)]) if html else ""
 
 

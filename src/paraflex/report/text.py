@@ -60,8 +60,7 @@ def table(
 
 def table_html(shown: Table) -> str:
     """Return the HTML of a table, with its numbers typeset and the units below the headings."""
-    heads = [(text_symbol(name), typeset(f"[{unit}]") if unit and column.is_numeric else unit)
-             for (name, unit), column in zip(shown.heads(), shown.columns, strict=True)]  # fmt: skip
+    heads = [(text_symbol(name), typeset(below)) for name, below in (column.head for column in shown.columns)]
     rows = [
         (text_symbol(name), ["\n".join(typeset(text_symbol(line)) for line in cell.split("\n")) for cell in cells])
         for name, *cells in shown.texts()
@@ -97,9 +96,10 @@ def by_run(tables: Sequence[tuple[str, str]]) -> str:
     )
 
 
-def pairs(facts: Sequence[tuple[str, str]]) -> str:
-    """Return the HTML of a list of names and values."""
-    return f'<dl class="pairs">{"".join(f"<div><dt>{escape(a)}</dt><dd>{escape(b)}</dd></div>" for a, b in facts)}</dl>'
+def pairs(facts: Sequence[tuple[str, str]], kind: str = "pairs") -> str:
+    """Return the HTML of a list of names and values, of a class of the style sheet; empty without any."""
+    items = "".join(f"<div><dt>{escape(name)}</dt><dd>{escape(value)}</dd></div>" for name, value in facts)
+    return f'<dl class="{kind}">{items}</dl>' if items else ""
 
 
 def _small(text: str) -> str:
