@@ -24,6 +24,9 @@ class DisplayUnit(NamedTuple):
 
 # Unit of every stress that is printed or drawn; moduli may be in GPa.
 STRESS = DisplayUnit("MPa", 1e-6)
+PERCENT = DisplayUnit("%", 100.0)
+# What motors and prescribed motions apply, by unit.
+EFFORTS = {"N m": "torque", "N": "force"}
 
 
 def printed_unit(unit: str) -> DisplayUnit:

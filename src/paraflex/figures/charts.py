@@ -5,7 +5,7 @@ Numbers of a description are in SI units; what draws it converts them by `shown_
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Literal, NamedTuple
 
@@ -321,8 +321,3 @@ def symmetrical_numbers(axis: Axis) -> Array:
 def stairs(times: Array, values: Array) -> tuple[Array, Array]:
     """Return the corners of the step curve of values that are held until the next one."""
     return np.repeat(times, 2)[1:], np.repeat(values, 2)[:-1]
-
-
-def numbered(names: Sequence[str]) -> Iterator[tuple[int, str, Look]]:
-    """Yield number, name and look of each curve."""
-    return ((k, name, look(k)) for k, name in enumerate(names))

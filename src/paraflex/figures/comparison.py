@@ -15,7 +15,7 @@ from paraflex.figures.selection import one_run
 from paraflex.figures.tables import Column, Table, in_row_units
 from paraflex.formatting import ROUNDING, display_unit, peak, text_symbol
 from paraflex.results.metrics import metric_label
-from paraflex.units import DisplayUnit
+from paraflex.units import PERCENT
 
 if TYPE_CHECKING:
     from paraflex.results.comparison import MotionPair, NumberPair, RunComparison
@@ -94,7 +94,7 @@ def setting_table(found: RunComparison) -> Table:
 def number_table(pairs: Sequence[NumberPair], title: str) -> Table:
     """Return the table of scalars of both runs."""
     values = [Column(word, [getattr(pair, word) for pair in pairs]) for word in ("first", "second", "difference")]
-    relative = Column("relative", [pair.relative for pair in pairs], digits=3, shown=DisplayUnit("%", 100.0))
+    relative = Column("relative", [pair.relative for pair in pairs], digits=3, shown=PERCENT)
     names = Column("number", [metric_label(pair.name) for pair in pairs])
     return Table(title, [names, *in_row_units(values, [pair.unit for pair in pairs]), relative])
 

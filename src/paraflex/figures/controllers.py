@@ -27,9 +27,9 @@ from paraflex.results.controllers import (
     ControllerData,
     controllers_of,
 )
-from paraflex.units import DisplayUnit
+from paraflex.units import EFFORTS, DisplayUnit
 
-_WORDS = {"rad": "angle", "m": "position", "rad/s": "rate", "m/s": "speed", "N m": "torque", "N": "force"}
+_WORDS = {"rad": "angle", "m": "position", "rad/s": "rate", "m/s": "speed", **EFFORTS}
 # Internal torques below this share of the largest torque are rounding errors.
 _INTERNAL = 1e-9
 

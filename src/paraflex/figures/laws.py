@@ -12,7 +12,7 @@ from paraflex.figures.entry import figure
 from paraflex.figures.selection import names_of
 from paraflex.figures.tables import Column, Table
 from paraflex.results.metrics import METRICS, VALIDITY, metric_label
-from paraflex.units import DisplayUnit
+from paraflex.units import PERCENT
 
 # Metrics shown first; others fill the remaining panels.
 _FIRST = ("tracking_rms_motion", "tracking_rms", "residual_vibration", "peak_torque_max")
@@ -87,7 +87,7 @@ def law_table(data: xr.Dataset) -> Table:
         if (name, "peak_torque_max" in data) == ("internal_torque_max", True):
             values = values.where(~(values < _ROUNDING * data["peak_torque_max"]), 0.0)
         if name != VALIDITY:
-            share = DisplayUnit("%", 100.0) if name.endswith("_share") else None
+            share = PERCENT if name.endswith("_share") else None
             # An incomplete run has no value.
             cells = np.where(status == "complete", values.transpose("mode", "law").values.ravel(), np.nan)
             columns.append(Column(metric_label(name), list(cells), values.attrs["units"], digits=3, shown=share))

@@ -17,6 +17,7 @@ from paraflex.figures.tables import Cell, Column, Table
 from paraflex.formatting import NO_VALUE, common_unit, number, peak, text_symbol
 from paraflex.results.beam_stresses import CONTACT, stresses_of
 from paraflex.results.loads import resolved_error, sliding_joints
+from paraflex.units import EFFORTS
 
 # Loads by run: the names of a run, such as its path and mode, and what `results.loads.load_figures` returns.
 LoadsOfRuns = Mapping[tuple[str, ...], Mapping[str, Any]]
@@ -147,7 +148,7 @@ def drive_efforts(data: xr.Dataset) -> Iterator[Chart]:
         ]
         units = dict.fromkeys(unit for one in found.values() for unit in str(one.attrs.get("units", usual)).split(", "))
         whose = " and ".join({"motor": "motors", "drive": "prescribed motions"}[dim] for dim in found)
-        word = {"N m": "torque", "N": "force", "N m, N": "torque, force"}.get(unit := _joined(units), quantity)
+        word = {**EFFORTS, "N m, N": "torque, force"}.get(unit := _joined(units), quantity)
         title = {"torque, force": "Efforts", "power": "Powers"}.get(word, f"{word.capitalize()}s")
         # The chart of the motors' torques alone is also that of `motor_torques`, shown once on a page.
         identity = "torques" if quantity == "effort" and "drive" not in found else f"{quantity}s"
@@ -236,7 +237,7 @@ def effort_table(loads: Mapping[str, Any]) -> Table:
     efforts = {**loads.get("motors", {}), **loads.get("drives", {})}
     rows = list(efforts.values())
     units = {one["torque_unit"] for one in rows}
-    word = {"N m": "torque", "N": "force"}.get(units.pop() or "" if len(units) == 1 else "", "torque, force")
+    word = EFFORTS.get(units.pop() or "" if len(units) == 1 else "", "torque, force")
     columns = [Column("motor or drive", list(efforts))]
     for head, key, other in ((word, "torque", "N m or N"), ("speed", "speed", "rad/s or m/s")):
         if word == "torque, force":

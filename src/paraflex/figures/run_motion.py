@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -15,6 +14,7 @@ from paraflex.figures.entry import figure
 from paraflex.figures.runs import compared, followed, of_names, ranges, run_names, stopped_runs
 from paraflex.figures.selection import names_of, point_number
 from paraflex.formatting import peak, text_symbol
+from paraflex.units import EFFORTS
 
 ANGLE = Axis("angle", "rad", "φ")
 ANGLES = Chart("angles", "Angles", ANGLE, choosing="link")
@@ -267,6 +267,5 @@ def deflections_of(data: xr.Dataset) -> Array:
 def effort_axis(data: xr.Dataset) -> Axis:
     """Return the axis of motor efforts: torques, forces of linear motors, or both."""
     unit = str(data["torque"].attrs.get("units", "N m"))
-    words: Mapping[str, Any] = {"N m": ("torque", "τ"), "N": ("force", "")}
-    name, symbol = words.get(unit, ("torque, force", ""))
-    return Axis(name, unit, symbol, zero=True)
+    name = EFFORTS.get(unit, "torque, force")
+    return Axis(name, unit, "τ" if name == "torque" else "", zero=True)

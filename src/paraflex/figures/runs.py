@@ -9,6 +9,7 @@ from dataclasses import replace
 import numpy as np
 import xarray as xr
 
+from paraflex.errors import InputError
 from paraflex.figures.charts import DOTTED, Array, Axis, Chart, Curve, Look, Span, look
 from paraflex.figures.selection import names_of, samples
 from paraflex.formatting import peak, text_symbol
@@ -128,6 +129,12 @@ def risen(values: Array) -> Array:
         return values
     enough = np.nan_to_num(values) >= _RISEN * float(np.median(known))
     return np.where(np.arange(values.size) >= np.argmax(enough), values, np.nan)
+
+
+def check_magnification(value: float | None) -> None:
+    """Raise InputError unless a magnification is a positive number, or None."""
+    if value is not None and not (math.isfinite(value) and value > 0.0):
+        raise InputError("not a magnification", field="magnification", value=value, remedy="give a positive number")
 
 
 def round_magnification(deviation: Array, extent: float) -> float:

@@ -12,10 +12,9 @@ from paraflex.figures.designs import column_label
 from paraflex.figures.entry import figure
 from paraflex.figures.tables import Column, Table, in_row_units
 from paraflex.formatting import number
-from paraflex.units import DisplayUnit
+from paraflex.units import PERCENT
 
 IDENTIFICATION = "identification"
-PERCENT = DisplayUnit("%", 100.0)
 _BEST, _FAILED = Look(0), Look(1)
 # Designs far above the best are drawn at the upper edge; otherwise they would hide the convergence.
 _HIGHEST = 3.0

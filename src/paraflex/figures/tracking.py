@@ -15,7 +15,15 @@ from paraflex.errors import InputError
 from paraflex.figures.charts import DASHED, DOTTED, Axis, Chart, Curve, Look, look
 from paraflex.figures.entry import figure
 from paraflex.figures.run_motion import actual_name, effort_axis, start_mark
-from paraflex.figures.runs import after_motion, compared, followed, ranges, round_magnification, stopped_runs
+from paraflex.figures.runs import (
+    after_motion,
+    check_magnification,
+    compared,
+    followed,
+    ranges,
+    round_magnification,
+    stopped_runs,
+)
 from paraflex.figures.selection import moving_directions, names_of, of_point, samples
 from paraflex.formatting import ROUNDING, display_unit, number, peak, quantity, text_symbol
 from paraflex.results.following import headline, ranked_by_motion
@@ -58,10 +66,7 @@ def end_effector_path(
         Point "body.point" in place of the end-effector; it has no desired path, and its own path is not magnified.
     """
     data = of_point(data, point)
-    if magnification is not None and not (math.isfinite(magnification) and magnification > 0.0):
-        raise InputError(
-            "not a magnification", field="magnification", value=magnification, remedy="give a positive number"
-        )
+    check_magnification(magnification)
     curves: list[Curve] = []
     desired = data["end_effector_desired"].values if "end_effector_desired" in data else None
     if desired is None and magnification is not None:

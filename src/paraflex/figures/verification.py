@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
@@ -10,11 +9,10 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from paraflex.errors import InputError
 from paraflex.figures.charts import Array, Axis, Chart, Curve, look
 from paraflex.figures.entry import figure
 from paraflex.figures.run_motion import most_deflected
-from paraflex.figures.runs import after_motion, round_magnification
+from paraflex.figures.runs import after_motion, check_magnification, round_magnification
 from paraflex.figures.selection import names_of
 from paraflex.figures.tables import Column, Table
 from paraflex.formatting import peak, text_symbol
@@ -71,13 +69,12 @@ def compared_paths(data: xr.Dataset, magnification: float | None = None) -> Iter
     magnification : float, optional
         Magnification of the deviations; by default a value at which they are visible.
     """
+    check_magnification(magnification)
     places, wanted = _places(data)
     desired = wanted[0, 0]
     times = magnification
     if times is None:
         times = round_magnification((places - desired).reshape(-1, 2), float(np.ptp(desired, axis=0).max()))
-    elif not (math.isfinite(times) and times > 0.0):
-        raise InputError("not a magnification", field="magnification", value=times, remedy="give a positive number")
     word = "desired" if times == 1.0 else f"desired, deviations from it × {times:g}"
     x, y = np.moveaxis(desired + times * (places - desired), -1, 0)
     curves = [*_by_model(data, y, x), Curve(word, desired[:, 1], desired[:, 0], desired=True),

@@ -14,6 +14,7 @@ from paraflex.formatting import number, quantity, speed_text, text_symbol
 from paraflex.report.text import by_run, sections, table_html
 from paraflex.results.controllers import controller_figures
 from paraflex.results.loads import load_figures, load_text, ranked
+from paraflex.units import EFFORTS
 
 # Largest number of prescribed motions with a tile.
 _MOST_TILES = 2
@@ -72,7 +73,7 @@ def load_tiles(figures: Mapping[str, Mapping[str, Any]]) -> list[tuple[str, str,
         tiles.append(("largest stress", load_text(one, "stress", "Pa", 3), where))
     for _, run, name, one in ranked(figures, "drives", "torque_max")[:_MOST_TILES]:
         unit = one["torque_unit"] or ""
-        kind = {"N m": "torque", "N": "force"}.get(unit, "effort")
+        kind = EFFORTS.get(unit, "effort")
         of = f"{_of(run, name)}, t = {number(one['torque_time'])} s"
         if one["power_max"] is not None and one["speed_max"] is not None:
             power = quantity(one["power_max"], "W", padded=False)

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from paraflex.findings import RESOLVED
 from paraflex.formatting import display_unit, error_text, number, quantity, speed_text
 from paraflex.results.numbers import finite_or_none, largest, units_of_each
+from paraflex.units import EFFORTS
 
 Figures = dict[str, float | str | None]
 # Unit of the rate of a joint, by the unit of the effort that drives it.
@@ -196,16 +197,13 @@ def stress_line(loads: Mapping[str, Mapping[str, Any]]) -> str:
 def effort_lines(figures: Mapping[str, Any], mode: str = "") -> list[str]:
     """Return a sentence for each prescribed motion of a run, with its largest torque, speed and power."""
     return [
-        f"{_whose(mode)}prescribed.{name}: {_EFFORTS[one['torque_unit']]} up to "
+        f"{_whose(mode)}prescribed.{name}: {EFFORTS.get(one['torque_unit'], 'torque or force')} up to "
         f"{load_text(one, 'torque', one['torque_unit'] or '')}{_at(one['torque_time'])}; "
         f"speed up to {speed_text(one['speed_max'], one['speed_unit'] or '')}; "
         f"power up to {quantity(one['power_max'], 'W', digits=4, padded=False)}{_at(one['power_time'])}"
         for name, one in figures.get("drives", {}).items()
         if None not in (one["torque_max"], one["speed_max"], one["power_max"])
     ]
-
-
-_EFFORTS = {"N m": "torque", "N": "force", None: "torque or force"}
 
 
 def _whose(mode: str) -> str:
