@@ -13,7 +13,8 @@ import paraflex as pf
 from paraflex.errors import InputError
 from paraflex.fem import mesh_beam
 from paraflex.figures.designs import read_designs
-from paraflex.figures.selection import one_run, select_model
+from paraflex.figures.entry import prepared
+from paraflex.figures.selection import one_run
 from paraflex.integrators.run import make_problem
 from paraflex.integrators.sensitivity import check_differentiable
 from paraflex.integrators.spectra import spectrum
@@ -62,7 +63,7 @@ def test_figures_of_a_run_without_modes_or_models(motion):
 
 def test_figures_of_models_and_magnifications(tracking):
     runs = tracking.expand_dims(model=["linear"])
-    refused(lambda: select_model(runs, "rigid"), "model", "no such model in these results", "one of linear")
+    refused(lambda: prepared(runs, models=["rigid"]), "model", "no such model in these results", "one of linear")
     refused(lambda: select(runs, None, "rigid"), "model", "no such model in these results", "choose from linear")
     refused(lambda: end_effector_path(tracking, magnification=-1.0), "magnification", "not a magnification",
             "positive number")  # fmt: skip

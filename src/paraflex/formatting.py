@@ -147,14 +147,6 @@ def count(value: float | None) -> str:
     return NO_VALUE if value is None or not math.isfinite(value) else str(int(value))
 
 
-def power_of_ten(value: float) -> str:
-    """Format a power of ten with superscripts, "10⁻⁵", and any other value as a plain number."""
-    exponent = round(math.log10(value)) if value > 0.0 else 0
-    if not math.isclose(value, 10.0**exponent, rel_tol=1e-9):
-        return f"{value:g}"
-    return f"10{raised(exponent)}"
-
-
 def logarithmic_number(value: float) -> str:
     """Format a number of a logarithmic axis: plain from 0.001 up to below 10⁴, else as "10⁻⁵" or "2·10⁻⁵"."""
     if value < 0.0:

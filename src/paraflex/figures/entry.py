@@ -13,7 +13,7 @@ from typing import Any, Literal
 import xarray as xr
 
 from paraflex.figures.charts import Chart
-from paraflex.figures.selection import as_runs, names_of, place_of
+from paraflex.figures.selection import as_runs, selected
 
 Charts = Callable[..., Iterable[Chart]]
 # Data of a figure: all results; the run of a mode; a mode and a pair of models; the number of a run; a table of
@@ -113,10 +113,10 @@ def prepared(data: Any, mode: str | None = None, models: Sequence[str] | None = 
     If a mode or models are given, the results are those of this mode and these models.
     """
     if models is not None:
-        data = data.isel(model=[place_of(model, names_of(data, "model"), "model") for model in models])
+        data = selected(data, "model", *models)
     if isinstance(data, xr.Dataset) and "time" in data.dims:
         return as_runs(data, mode)
-    return data if mode is None else data.isel(mode=[place_of(mode, names_of(data, "mode"), "mode")])
+    return data if mode is None else selected(data, "mode", mode)
 
 
 _MODULES: dict[str, dict[str, Figure]] = {}

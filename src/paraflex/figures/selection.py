@@ -29,14 +29,14 @@ def names_of(data: xr.Dataset | xr.DataArray, dim: str) -> list[str]:
     return [str(name) for name in data[dim].values]
 
 
+def selected(data: xr.Dataset, dim: str, *names: str) -> xr.Dataset:
+    """Return the results of some names along a dimension, which is kept."""
+    return data.isel({dim: [place_of(name, names_of(data, dim), dim) for name in names]})
+
+
 def select_run(data: xr.Dataset, mode: str) -> xr.Dataset:
     """Return the run of one mode."""
-    return data.isel(mode=place_of(mode, names_of(data, "mode"), "mode"))
-
-
-def select_model(data: xr.Dataset, model: str) -> xr.Dataset:
-    """Return the runs of one model."""
-    return data.isel(model=place_of(model, names_of(data, "model"), "model"))
+    return selected(data, "mode", mode).isel(mode=0)
 
 
 def prototype_pair(data: xr.Dataset) -> tuple[str, str] | None:
@@ -122,5 +122,5 @@ def as_runs(data: xr.Dataset, mode: str | None = None) -> xr.Dataset:
     if "mode" not in data.dims:
         return one_run(data, mode).expand_dims(mode=[""]).transpose("mode", "time", ...)
     if mode is not None:
-        data = data.isel(mode=[place_of(mode, names_of(data, "mode"), "mode")])
+        data = selected(data, "mode", mode)
     return data.transpose("mode", "time", ...)

@@ -13,15 +13,7 @@ from matplotlib.axes import Axes
 # Okabe and Ito (2008), Color Universal Design; their yellow is omitted because it is too light for a thin line.
 BLACK, BLUE, VERMILLION, GREEN = "#000000", "#0072B2", "#D55E00", "#009E73"
 COLOURS = (BLUE, VERMILLION, GREEN, BLACK, "#CC79A7", "#E69F00", "#56B4E9")
-DASHES: tuple[Any, ...] = ("-", (0, (5, 1.5)), (0, (5, 1.5, 1, 1.5)), (0, (1, 1)), (0, (9, 2)))
 SHADE = "0.92"
-
-
-def look_of(number: int) -> dict[str, Any]:
-    """Return colour and dashes of a line by its number; up to 35 lines differ, and neighbours also in grey."""
-    return {"color": COLOURS[number % len(COLOURS)], "linestyle": DASHES[number % len(DASHES)]}
-
-
 ZERO: dict[str, Any] = {"color": "0.7", "linewidth": 0.5, "zorder": 0.5}
 
 # Fonts are those of Matplotlib, so that a figure is the same on every machine.

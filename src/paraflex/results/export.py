@@ -31,7 +31,7 @@ if TYPE_CHECKING:
 
 EXPORT_FORMATS = ("csv", "parquet", "mat", "netcdf")
 ENDINGS = {"csv": ".csv", "parquet": ".parquet", "mat": ".mat", "netcdf": ".nc"}
-TIME_SERIES, FIGURES_TABLE, SHAPES, SECTIONS = "time_series", "figures", "shapes", "sections"
+FIGURES_TABLE, SHAPES, SECTIONS = "figures", "shapes", "sections"
 LAWS = "laws"
 # Dimensions of the rows of tables, outermost first; the independent variable is the innermost.
 _ROW_DIMENSIONS = ("model", "law", "mode")

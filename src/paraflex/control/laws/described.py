@@ -24,7 +24,6 @@ if TYPE_CHECKING:
 # Table of a model file that holds the controllers; and the word that selects none of them.
 TABLE, NONE = "controller", "none"
 
-
 References = str | Mapping[str, InTime]
 Limits = float | tuple[float, float] | Mapping[str, float | tuple[float, float]]
 _DEFAULTS = ", ".join(f'"{law.reference}" with "{kind}"' for kind, law in LAWS.items() if law.reference)
@@ -172,11 +171,11 @@ def check_together(controllers: Iterable[ControllerDescription]) -> None:
 
 
 def _functions(reference: Any) -> Any:
-    """Return references with angle laws replaced by functions of time."""
+    """Return references with profiles in time replaced by functions of time."""
     if not isinstance(reference, Mapping):
         return reference
     return {name: _value(each) if isinstance(each, TimeProfile) else each for name, each in reference.items()}
 
 
-def _value(law: TimeProfile) -> Callable[[float], float]:
-    return lambda t: float(law.evaluate(np.array([t]))[0][0])
+def _value(profile: TimeProfile) -> Callable[[float], float]:
+    return lambda t: float(profile.evaluate(np.array([t]))[0][0])

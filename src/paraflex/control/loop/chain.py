@@ -32,7 +32,6 @@ from paraflex.mechanism.quantities import not_negative
 from paraflex.motion import MotionRun
 from paraflex.tracking import TrackingRun
 
-Limit = float | tuple[float, float]
 # Attributes of a `SampledController` that hold its state: a law may step itself.
 CHANGING = ("law", "started", "chain_state")
 
