@@ -75,9 +75,18 @@ PACKAGES = (
     "compilation",
 )
 
+_TITLES = {"integrators.methods": "methods of integration"}
+
 # Public names that are modules, and constants, which have no docstrings.
 _MODULES = {"library": "library", "methods": "integrators.methods", "plots": "plots"}
 _CONSTANTS = {"METHODS": "Methods of integration by their names."}
+
+
+def on_config(config: Any) -> Any:
+    """List the pages of packages last in the navigation of the reference."""
+    reference = next(item["Reference"] for item in config.nav if "Reference" in item)
+    reference.append({"Packages": [{_TITLES.get(package, package): _page(package)} for package in PACKAGES]})
+    return config
 
 
 def on_files(files: Files, config: Any) -> Files:
