@@ -24,11 +24,11 @@ def print_laws(console: Console, result: LawComparison) -> None:
 
 def _reasons(result: LawComparison) -> Iterator[str]:
     """Yield the reasons why laws failed or are doubtful in a mode; cases with the same reason share a line."""
-    said = dict[tuple[str, str], list[str]]()
+    alike = dict[tuple[str, str], list[str]]()
     for name, cell in _cells(result):
         if reason := str(cell["reason"].item()):
-            said.setdefault((str(cell["status"].item()), reason), []).append(name)
-    for (status, reason), names in said.items():
+            alike.setdefault((str(cell["status"].item()), reason), []).append(name)
+    for (status, reason), names in alike.items():
         yield f"{'; '.join(names)}: {status}, {reason}"
 
 

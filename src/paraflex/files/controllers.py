@@ -35,17 +35,17 @@ def read_controllers(table: ModelTable, mechanism: Mechanism) -> dict[str, Contr
 
 
 def _read(name: str, table: Any, parameters: Mapping[str, float], duration: float | None) -> ControllerDescription:
-    said = {key: value for key, value in table if value is not None}
-    kind = LAWS[said.pop("type")]
-    law = kind(**{each.name: said.pop(each.name) for each in fields(kind) if each.name in said})
+    entries = {key: value for key, value in table if value is not None}
+    kind = LAWS[entries.pop("type")]
+    law = kind(**{each.name: entries.pop(each.name) for each in fields(kind) if each.name in entries})
     if isinstance(table.reference, Mapping):
-        said["reference"] = found = {}
+        entries["reference"] = found = {}
         for sensor, given in table.reference.items():
             # A reference is written like the torque of a motor.
             torque = TorqueTable.model_construct(torque=given)
             with renamed(f"reference.{sensor}"):
                 found[sensor] = read_components(torque, "torque", parameters, duration)[0]
-    return ControllerDescription(name, law, **said)
+    return ControllerDescription(name, law, **entries)
 
 
 def controller_table(one: ControllerDescription) -> dict[str, Any]:
@@ -63,12 +63,12 @@ def controller_table(one: ControllerDescription) -> dict[str, Any]:
         given = getattr(law, each.name)
         if each.metadata.get("by") and isinstance(given, Sequence | np.ndarray):
             raise inexpressible(f"{place}.{each.name}", given, "give one number, or numbers by name")
-    said = {"type": law.kind} | changed_fields(law) | changed_fields(one, "name", "law")
+    entries = {"type": law.kind} | changed_fields(law) | changed_fields(one, "name", "law")
     if isinstance(one.reference, Mapping):
         try:
-            said["reference"] = {sensor: components_table((each,), "torque")["torque"]
-                                 for sensor, each in one.reference.items()}  # fmt: skip
+            entries["reference"] = {sensor: components_table((each,), "torque")["torque"]
+                                    for sensor, each in one.reference.items()}  # fmt: skip
         except (InputError, KeyError):
             raise inexpressible(f"{place}.reference", dict(one.reference),
-                            "give numbers or expressions of the time") from None  # fmt: skip
-    return said
+                                "give numbers or expressions of the time") from None  # fmt: skip
+    return entries

@@ -245,11 +245,11 @@ def _member_table(members: Sequence[Any], base: type[_Table] = _Table) -> Any:
     """Return the table of a member that belongs to one of several classes, with the fields of a base table as well."""
     tables = []
     for one in members:
-        said = _fields_of(one)
+        entries = _fields_of(one)
         if len(members) > 1:
-            said = {"type": _choice([one.kind], [each.kind for each in members])} | said
+            entries = {"type": _choice([one.kind], [each.kind for each in members])} | entries
         about = one.__doc__.partition("\n\n")[0]
-        tables.append(create_model(f"{one.__name__}Table", __base__=base, __doc__=about, **said))
+        tables.append(create_model(f"{one.__name__}Table", __base__=base, __doc__=about, **entries))
     return tables[0] if len(tables) == 1 else Annotated[reduce(or_, tables), Field(discriminator="type")]
 
 

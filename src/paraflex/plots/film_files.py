@@ -169,9 +169,9 @@ def _write_mp4(film: Film, file: Path, encoder: str, report: Report) -> None:
         "-r", f"{film.fps:g}", "-i", "-", "-an", "-c:v", "libx264", "-preset", "veryfast", "-tune", "animation",
         "-crf", "18", "-pix_fmt", "yuv420p", "-movflags", "+faststart", "-f", "mp4", str(file),
     ]  # fmt: skip
-    with tempfile.TemporaryFile() as said:
+    with tempfile.TemporaryFile() as messages:
         with starting_processes():
-            process = subprocess.Popen(command, stdin=subprocess.PIPE, stderr=said)
+            process = subprocess.Popen(command, stdin=subprocess.PIPE, stderr=messages)
         assert process.stdin is not None
         try:
             for i, frame in enumerate(frames(film), 1):
@@ -190,8 +190,8 @@ def _write_mp4(film: Film, file: Path, encoder: str, report: Report) -> None:
                 with suppress(BrokenPipeError):
                     process.stdin.close()
         if process.returncode:
-            said.seek(0)
-            lines = said.read().decode(errors="replace").strip().splitlines()
+            messages.seek(0)
+            lines = messages.read().decode(errors="replace").strip().splitlines()
             raise OutputError(
                 f"the encoder {encoder} gave up ({lines[-1] if lines else f'exit code {process.returncode}'})",
                 field=str(file.with_suffix("")), remedy="write .gif, .svg or a folder of PNG instead",

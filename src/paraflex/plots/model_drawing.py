@@ -306,15 +306,15 @@ def _entries(
     motors, prescribed = bool(posed.mechanism.motors), bool(posed.mechanism.prescribed)
     drive = "motor or drive" if motors and prescribed else "motor" if motors else "drive"
     for kind in driven:
-        said = drive if len(driven) == 1 or kind == "pin" else f"{drive}, {_KINDS.get(kind, kind)}"
-        entries.append((said, joint_sign(kind, limits, look, _WIDTH, driven=True)))
+        text = drive if len(driven) == 1 or kind == "pin" else f"{drive}, {_KINDS.get(kind, kind)}"
+        entries.append((text, joint_sign(kind, limits, look, _WIDTH, driven=True)))
     if acting.moves:
-        said = "first movement" if posed.mechanism.motors else "prescribed motion"
-        entries.append((said, arrow_sign(acting.moves[0], limits, _move_looks(look))))
-    for later, said in ((False, "load"), (True, "load, not yet at the start")):
+        text = "first movement" if posed.mechanism.motors else "prescribed motion"
+        entries.append((text, arrow_sign(acting.moves[0], limits, _move_looks(look))))
+    for later, text in ((False, "load"), (True, "load, not yet at the start")):
         load = next((one for one in acting.loads if one.later is later), None)
         if load is not None:
-            entries.append((said, arrow_sign(load.arrow, limits, _load_looks(later, look))))
+            entries.append((text, arrow_sign(load.arrow, limits, _load_looks(later, look))))
     if sensors:
         entries.append(("sensor", Line2D([], [], **SENSOR, **_sensor_colours(look))))
     if posed.mechanism.end_effector is not None:
@@ -353,14 +353,14 @@ def _title(figure: Figure, posed: Posed, look: Theme) -> None:
         va="center",
         parse_math=False,
     )
-    said = f"assembly {posed.assembly}" if posed.assembly else "as started"
+    text = f"assembly {posed.assembly}" if posed.assembly else "as started"
     if posed.gaps:
-        said += ", as given: it does not close"
+        text += ", as given: it does not close"
     elif posed.path and not posed.problems:
-        said += f", at the start of path {posed.path}"
+        text += f", at the start of path {posed.path}"
     left_out = _left_out(posed)
     figure.text(
-        0.988, y, said + left_out, color=_OPEN if posed.gaps else look.ink, fontsize=_TEXT, va="center", ha="right",
+        0.988, y, text + left_out, color=_OPEN if posed.gaps else look.ink, fontsize=_TEXT, va="center", ha="right",
         parse_math=False,
     )  # fmt: skip
 

@@ -126,10 +126,10 @@ def bases_of(system: System, deflections: Sequence[Array], count: int) -> dict[s
     # Equal directions keep the order of their bodies.
     kept = sorted(found, key=lambda one: -one[0])[:count]
     if not kept or kept[-1][0] <= _ROUNDING * kept[0][0]:
-        told = sum(size > _ROUNDING * kept[0][0] for size, _, _ in found) if kept else 0
+        known = sum(size > _ROUNDING * kept[0][0] for size, _, _ in found) if kept else 0
         raise InputError(
-            f"are more than the {told} directions in which the motion bends the bodies", field="coordinates",
-            value=count, remedy=f"keep at most {told}" if told else "it does not bend them at all",
+            f"are more than the {known} directions in which the motion bends the bodies", field="coordinates",
+            value=count, remedy=f"keep at most {known}" if known else "it does not bend them at all",
         )  # fmt: skip
     return {
         body.name: _rows([shape for _, name, shape in kept if name == body.name], len(body.modes.vectors))

@@ -250,12 +250,12 @@ def right_half_plane(values: Complex) -> Complex:
 def phase_sentences(data: xr.Dataset) -> Iterator[str]:
     """Yield a sentence for each input-output map that is not minimum phase, on the bandwidth that its zeros allow."""
     for name in (str(each) for each in data["map"].values):
-        said: dict[str, list[str]] = {}
+        by_limit: dict[str, list[str]] = {}
         for mode in data["mode"].values.tolist():
             if limit := limiting_zero(zeros_of(data, mode, name)):
-                said.setdefault(number(limit), []).append(mode)
-        if said:
-            listed = "; ".join(f"{', '.join(modes)} from {limit} rad/s on" for limit, modes in said.items())
+                by_limit.setdefault(number(limit), []).append(mode)
+        if by_limit:
+            listed = "; ".join(f"{', '.join(modes)} from {limit} rad/s on" for limit, modes in by_limit.items())
             yield (
                 f"{MAP_WORDS[name]}: not of minimum phase in {listed}. No controller that follows these outputs is "
                 "faster than about the lowest of these zeros"

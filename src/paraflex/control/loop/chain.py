@@ -247,13 +247,13 @@ class SampledController:
         for i, reference in enumerate(self.found_references):
             if reference is not None:
                 errors[i] -= reference(t)
-        said, state = self.started.step(self.chain_state.law, k, t, errors)
+        torques, state = self.started.step(self.chain_state.law, k, t, errors)
         self.chain_state = self.chain_state._replace(law=state, filtered=filtered)
-        if said is None:
+        if torques is None:
             return None  # As a float array it would be NaN.
-        wanted = real_numbers(said)
+        wanted = real_numbers(torques)
         if wanted is None:
-            return said  # The loop reports the error.
+            return torques  # The loop reports the error.
         before = self.chain_state.given
         if wanted.shape != before.shape or not np.all(np.isfinite(wanted)):
             return wanted
