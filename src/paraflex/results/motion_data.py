@@ -24,7 +24,6 @@ from paraflex.results.labelled import (
     error_variables,
     label,
     link_coordinates,
-    link_variables,
     padded,
     provenance,
     with_totals,
@@ -75,7 +74,7 @@ def motion_dataset(
     values: Variables = {
         "coordinate_value": (("coordinate",), q),
         "coordinate_rate": (("coordinate",), v),
-        **link_variables(links, mechanism),
+        **links.variables,
     }  # fmt: skip
     data: dict[str, Any] = {
         name: (("time", *dims), padded(each, run.times.size)) for name, (dims, each) in values.items()

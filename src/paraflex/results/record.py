@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field
 from typing import Any
 
 from paraflex.arguments import named_in_errors
@@ -38,7 +38,7 @@ BRAKE_ENERGY = "brake_energy"
 
 @named_in_errors("a record", "what results.record makes of a run")
 @dataclass(frozen=True, kw_only=True)
-class Record(Links):
+class Record:
     """Run of a task, link by link.
 
     Attributes
@@ -56,6 +56,8 @@ class Record(Links):
         Condition number of the actuation matrix.
     end_effector : PointMotion
         Position, velocity and acceleration of the end-effector, three (k, 2) arrays.
+    links : Links
+        Motion and loads of bodies, points, joints and motors.
     figures : mapping
         Values of the figures named in RUN_FIGURES.
     validity : Validity, optional
@@ -74,6 +76,7 @@ class Record(Links):
     torque: Array
     condition: Array
     end_effector: PointMotion
+    links: Links
     figures: Mapping[str, Any] = field(default_factory=dict)
     validity: Validity | None = None
     findings: tuple[Finding, ...] = ()
@@ -89,9 +92,7 @@ def record(run: TrackingRun) -> Record:
     whole = task if task.whole is None else task.whole
     effector = task.mechanism.end_effector
     assert effector is not None
-    links = system_links(task.system, solution, torque, k)
     return Record(
-        **{each.name: getattr(links, each.name) for each in fields(Links)},
         task=whole,
         method=run.method,
         options=solution.options,
@@ -99,6 +100,7 @@ def record(run: TrackingRun) -> Record:
         torque=torque,
         condition=run.condition,
         end_effector=point_motion(task.system, effector.point, solution.q[:k], solution.v[:k], solution.a[:k]),
+        links=system_links(task.system, solution, torque, k),
         figures={name: getattr(solution, name) for name in (*RUN_FIGURES, BRAKE_ENERGY)},
         validity=run.validity,
         findings=run.findings,

@@ -15,7 +15,7 @@ from paraflex.findings import Finding
 from paraflex.results.drawing import system_drawing
 from paraflex.results.findings import keep_findings, verdict_of
 from paraflex.results.kinds import check_kind
-from paraflex.results.labelled import label, link_coordinates, link_variables, name_units, with_totals
+from paraflex.results.labelled import label, link_coordinates, name_units, with_totals
 from paraflex.results.links import system_links
 from paraflex.results.numbers import by_label, finite_or_none, single, stacked
 from paraflex.results.run_traces import StaticsTraces
@@ -87,8 +87,7 @@ def statics_dataset(
     # The extended system has the rows that hold, move or load joints, so that joint loads include their efforts.
     torques = np.zeros((len(found.equilibria), len(mechanism.motors)))
     links = system_links(found.equations.extended, found.solution, torques, len(torques))
-    values = link_variables(links, mechanism)
-    data: dict[str, Any] = {name: (("time", *dims), each) for name, (dims, each) in values.items()}
+    data: dict[str, Any] = {name: (("time", *dims), each) for name, (dims, each) in links.variables.items()}
     data |= {name: each.item() for name, each in validity_variables([found.validity]).items()}
     data |= {"status": found.status, "message": found.message}
     steps = np.arange(len(found.equilibria))
