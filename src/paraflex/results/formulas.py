@@ -28,8 +28,8 @@ def during_motion(t: Numbers, motion_end: float) -> NDArray[np.bool_]:
 
 
 def length(vectors: Numbers) -> Numbers:
-    """Return the lengths (k,) of vectors (k, 2)."""
-    return np.sqrt(vectors[:, 0] ** 2 + vectors[:, 1] ** 2)
+    """Return the lengths (...,) of vectors (..., 2)."""
+    return np.sqrt(vectors[..., 0] ** 2 + vectors[..., 1] ** 2)
 
 
 def largest_norm(vectors: Numbers) -> float:

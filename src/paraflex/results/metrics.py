@@ -220,7 +220,7 @@ def _of_currents(formula: Callable[[Electrical], Any]) -> Formula:
     """Return the formula of a value per motor from currents and voltages, NaN without samples."""
 
     def value(run: Any, _: Any) -> Any:
-        found = run.electrical
+        found = run.run.electrical
         return formula(found) if found.t.size else np.full(len(found.motors), np.nan)
 
     return value

@@ -10,7 +10,7 @@ from paraflex.arguments import named_in_errors
 from paraflex.arrays import Array
 from paraflex.control.loop.run_loop import ControllerRecord
 from paraflex.control.loop.runs import ControlledTracking
-from paraflex.dynamics.points import PointMotion, point_motion
+from paraflex.dynamics.points import PointMotion
 from paraflex.findings import Finding
 from paraflex.integrators import IntegrationOptions
 from paraflex.results.links import Links, system_links
@@ -86,21 +86,16 @@ class Record:
 
 def record(run: TrackingRun) -> Record:
     """Return the record of a run; finite segments are reported as the links they divide."""
-    task, solution, torque = run.task, run.solution, run.applied
-    # The state at an event is one sample in addition to the task's times.
-    k = solution.t.size - bool(solution.event)
-    whole = task if task.whole is None else task.whole
-    effector = task.mechanism.end_effector
-    assert effector is not None
+    solution, torque = run.solution, run.applied
     return Record(
-        task=whole,
+        task=run.task.whole or run.task,
         method=run.method,
         options=solution.options,
         mode=run.mode.name,
         torque=torque,
         condition=run.condition,
-        end_effector=point_motion(task.system, effector.point, solution.q[:k], solution.v[:k], solution.a[:k]),
-        links=system_links(task.system, solution, torque, k),
+        end_effector=run.end_effector,
+        links=system_links(run.system, solution, torque, run.samples),
         figures={name: getattr(solution, name) for name in (*RUN_FIGURES, BRAKE_ENERGY)},
         validity=run.validity,
         findings=run.findings,
