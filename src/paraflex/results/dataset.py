@@ -16,7 +16,7 @@ from paraflex.integrators import IntegrationOptions
 from paraflex.kinematics import Path, length_fraction
 from paraflex.results.acting import load_variables
 from paraflex.results.controllers import INTERNAL, with_controllers
-from paraflex.results.findings import MODE, keep_findings
+from paraflex.results.findings import MODE, keep_findings, validity_variables
 from paraflex.results.following import KEPT_METRICS, ErrorSpan, PathPart, metric_variables, too_short
 from paraflex.results.labelled import (
     Variables,
@@ -28,7 +28,6 @@ from paraflex.results.labelled import (
     with_totals,
 )
 from paraflex.results.record import BRAKE_ENERGY, RUN_FIGURES, Record, record
-from paraflex.results.validity import validity_variables
 from paraflex.tracking import TrackingRun
 from paraflex.validity import implausible_numbers
 

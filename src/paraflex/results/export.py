@@ -20,9 +20,8 @@ from paraflex.folders import RESULT_KINDS, added_to
 from paraflex.results.beam_stresses import SECTION
 from paraflex.results.controllers import SAMPLE, controller_names, controller_variables, dimension
 from paraflex.results.kinds import kind_of
-from paraflex.results.parquet import read_parquet, write_parquet
-from paraflex.results.spreadsheet import spreadsheet_table
 from paraflex.results.storage import save_results
+from paraflex.results.tables import read_parquet, spreadsheet_table, write_parquet
 from paraflex.writing import whole_file
 
 if TYPE_CHECKING:

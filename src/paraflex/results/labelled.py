@@ -15,6 +15,7 @@ from paraflex.integrators import IntegrationOptions
 from paraflex.mechanism import Mechanism
 from paraflex.results.beam_stresses import largest_stresses
 from paraflex.results.drawing import drawing_coordinates
+from paraflex.results.findings import VALIDITY_UNITS
 from paraflex.results.links import Links
 from paraflex.results.metrics import METRICS
 from paraflex.results.sensors import READING, SENSOR
@@ -26,7 +27,6 @@ from paraflex.results.stress import (
     Variables,
     section_coordinates,
 )
-from paraflex.results.validity import UNITS as VALIDITY_UNITS
 
 UNITS = (
     {

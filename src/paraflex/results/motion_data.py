@@ -17,7 +17,7 @@ from paraflex.integrators.methods import title_of
 from paraflex.motion import MotionRun
 from paraflex.results.acting import load_variables
 from paraflex.results.controllers import controller_figures, with_controllers
-from paraflex.results.findings import keep_findings, verdict_of
+from paraflex.results.findings import keep_findings, validity_summary, validity_variables, verdict_of
 from paraflex.results.kinds import check_kind
 from paraflex.results.labelled import (
     Variables,
@@ -34,7 +34,6 @@ from paraflex.results.numbers import by_label, finite_or_none
 from paraflex.results.record import RUN_FIGURES
 from paraflex.results.reduced_runs import reduced_run_figures
 from paraflex.results.sensors import sensor_figures
-from paraflex.results.validity import validity_summary, validity_variables
 from paraflex.validity import implausible_numbers
 
 

@@ -13,7 +13,7 @@ from paraflex.arguments import checked_arguments
 from paraflex.equilibria import Statics
 from paraflex.findings import Finding
 from paraflex.results.drawing import system_drawing
-from paraflex.results.findings import keep_findings, verdict_of
+from paraflex.results.findings import keep_findings, validity_summary, validity_variables, verdict_of
 from paraflex.results.kinds import check_kind
 from paraflex.results.labelled import label, link_coordinates, name_units, with_totals
 from paraflex.results.links import system_links
@@ -21,7 +21,6 @@ from paraflex.results.numbers import by_label, finite_or_none, single, stacked
 from paraflex.results.run_traces import StaticsTraces
 from paraflex.results.statics_steps import NAMED_UNITS
 from paraflex.results.storage import origin
-from paraflex.results.validity import validity_summary, validity_variables
 from paraflex.validity import implausible_numbers
 
 # Number of frequencies kept for each step.

@@ -9,7 +9,7 @@ import xarray as xr
 
 from paraflex.arguments import checked_arguments
 from paraflex.results.controllers import controller_figures
-from paraflex.results.findings import verdict_of
+from paraflex.results.findings import validity_summary, verdict_of
 from paraflex.results.following import FOLLOWING, ErrorSpan, part_run
 from paraflex.results.kinds import check_kind
 from paraflex.results.loads import load_figures
@@ -18,7 +18,6 @@ from paraflex.results.numbers import by_label, finite_or_none
 from paraflex.results.reduced_runs import reduced_run_figures
 from paraflex.results.sensors import sensor_figures
 from paraflex.results.traces import data_traces
-from paraflex.results.validity import validity_summary
 
 _COUNTS = ("steps", "rejected", "newton_iterations", "factorisations")
 _FIGURES = (
