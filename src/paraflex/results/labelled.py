@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from importlib.metadata import version
 from typing import Any
 
@@ -18,6 +18,7 @@ from paraflex.results.drawing import drawing_coordinates
 from paraflex.results.findings import VALIDITY_UNITS
 from paraflex.results.links import Links
 from paraflex.results.metrics import METRICS
+from paraflex.results.numbers import name_units
 from paraflex.results.sensors import READING, SENSOR
 from paraflex.results.storage import origin
 from paraflex.results.stress import (
@@ -27,6 +28,7 @@ from paraflex.results.stress import (
     Variables,
     section_coordinates,
 )
+from paraflex.units import RATES
 
 UNITS = (
     {
@@ -216,20 +218,12 @@ def _name_efforts(data: xr.Dataset, units: Iterable[str], speed: str, names: Ite
     """Write units of torques or forces and of their joints' speeds; `units_each` if there are both kinds, in order."""
     each = list(units)
     units = sorted(set(each), reverse=True) or ["N m"]
-    speeds = {"N m": "rad/s", "N": "m/s"}
     if speed in data:
-        data[speed].attrs["units"] = ", ".join(speeds[unit] for unit in units)
+        data[speed].attrs["units"] = ", ".join(RATES[unit] for unit in units)
     for name in (each for each in names if each in data):
         name_units(data[name], units, each)
         if units == ["N"]:
             data[name].attrs["long_name"] = data[name].attrs["long_name"].replace("torque", "force")
-
-
-def name_units(array: xr.DataArray, units: Sequence[str], each: Sequence[str]) -> None:
-    """Write the units of a variable; if there are several, also `units_each`, one for each label in their order."""
-    array.attrs["units"] = ", ".join(units)
-    if len(units) > 1:
-        array.attrs["units_each"] = ", ".join(each)
 
 
 def provenance(

@@ -34,7 +34,7 @@ from paraflex.results.numbers import by_label, finite_or_none
 from paraflex.results.record import RUN_FIGURES
 from paraflex.results.reduced_runs import reduced_run_figures
 from paraflex.results.sensors import sensor_figures
-from paraflex.validity import implausible_numbers
+from paraflex.validity import beyond_range, implausible_numbers
 
 
 @checked_arguments()
@@ -100,8 +100,7 @@ def motion_dataset(
     }
     if isinstance(run, ControlledMotion):
         out = with_controllers(out, [run.controllers], [motor.name for motor in mechanism.motors])
-    beyond = [] if run.validity is None or run.validity.holds else [run.validity.finding()]
-    keep_findings(out, [*findings, *implausible_numbers(mechanism), *beyond, *run.findings])
+    keep_findings(out, [*findings, *implausible_numbers(mechanism), *beyond_range(run.validity), *run.findings])
     return out
 
 
