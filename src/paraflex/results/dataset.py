@@ -18,6 +18,7 @@ from paraflex.results.acting import load_variables
 from paraflex.results.controllers import INTERNAL, with_controllers
 from paraflex.results.findings import MODE, keep_findings, validity_variables
 from paraflex.results.following import KEPT_METRICS, ErrorSpan, PathPart, metric_variables, too_short
+from paraflex.results.kinds import BRAKE_ENERGY, RUN_FIGURES
 from paraflex.results.labelled import (
     Variables,
     error_variables,
@@ -27,7 +28,7 @@ from paraflex.results.labelled import (
     provenance,
     with_totals,
 )
-from paraflex.results.record import BRAKE_ENERGY, RUN_FIGURES, Record, record
+from paraflex.results.record import Record, record
 from paraflex.tracking import TrackingRun
 from paraflex.validity import implausible_numbers
 

@@ -44,11 +44,6 @@ def rms(values: Numbers) -> Any:
     return np.sqrt(np.mean(values**2, axis=0))
 
 
-def integral(t: Numbers, values: Numbers) -> Any:
-    """Return the integral over time by the trapezoidal rule."""
-    return np.sum(0.5 * (values[1:] + values[:-1]) * np.diff(t))
-
-
 def drift_speed(t: Numbers, position: Numbers) -> Any:
     """Return the mean speed [m/s] of the drift of positions (k, 2) at times t (k,) from which `vibration` is measured.
 

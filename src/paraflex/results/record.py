@@ -13,27 +13,10 @@ from paraflex.control.loop.runs import ControlledTracking
 from paraflex.dynamics.points import PointMotion
 from paraflex.findings import Finding
 from paraflex.integrators import IntegrationOptions
+from paraflex.results.kinds import BRAKE_ENERGY, RUN_FIGURES
 from paraflex.results.links import Links, system_links
 from paraflex.tracking import TrackingRun, TrackingTask
 from paraflex.validity import Validity
-
-# Names of the figures on the course of a run, which every record has.
-RUN_FIGURES = (
-    "status",
-    "message",
-    "steps",
-    "rejected",
-    "newton_iterations",
-    "factorisations",
-    "wall_time",
-    "constraint_position_max",
-    "constraint_velocity_max",
-    "energy_balance_max",
-    "event",
-    "event_time",
-)
-# Energy absorbed by brakes, if there were any.
-BRAKE_ENERGY = "brake_energy"
 
 
 @named_in_errors("a record", "what results.record makes of a run")
