@@ -21,7 +21,7 @@ from paraflex.campaign.journal import JOURNAL, read_journal, write_journal
 from paraflex.errors import InputError, OutputError, ResultWarning
 from paraflex.plots.sources import open_source
 from paraflex.results import open_results
-from paraflex.results.parquet import read_parquet
+from paraflex.results.tables import read_parquet
 from paraflex.seals import check_seal, seal
 from paraflex.studies import load_sweep, sweep
 from paraflex.writing import read_json, write_json

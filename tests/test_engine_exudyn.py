@@ -106,6 +106,7 @@ def distance(a, b):
 
 TIGHT = IntegrationOptions(tolerance=1e-6)
 FINE = ExudynOptions(step=2.5e-5, refinement=2)
+TIP = ("tip_axial", "tip_transverse", "tip_slope")
 
 
 @pytest.fixture(scope="module")
@@ -131,16 +132,19 @@ def test_a_linkage_moves_as_with_second_order_geometry(bar, stiffness):
     assert distance(ours, linear) > 8e-6
     assert theirs.figures["constraint_position_max"] < 1e-9
     # The work that went in is 0.2 J.
-    assert np.ptp(theirs.work) > 0.1
+    assert np.ptp(theirs.links["work"]) > 0.1
     assert theirs.figures["energy_balance_max"] < 2e-6
     for name in ("kinetic_energy", "strain_energy", "work"):
-        np.testing.assert_allclose(getattr(theirs, name), getattr(ours, name), rtol=0, atol=1.5e-5, err_msg=name)
+        np.testing.assert_allclose(theirs.links[name], ours.links[name], rtol=0, atol=1.5e-5, err_msg=name)
     # Bending vibration at 10 krad/s, of 0.01 mm and 0.1 mrad, is damped by one and not by the other.
-    np.testing.assert_allclose(theirs.points, ours.points, rtol=0, atol=2e-6)
-    np.testing.assert_allclose(theirs.chord, ours.chord, rtol=0, atol=3e-5)
-    np.testing.assert_allclose(theirs.angle, ours.angle, rtol=0, atol=1e-4)
-    np.testing.assert_allclose(theirs.tip, ours.tip, rtol=0, atol=1e-4)
-    assert np.max(np.abs(ours.tip[:, 1, 1])) > 2e-3
+    for name, within in (
+        ("point_position", 2e-6),
+        ("chord_angle", 3e-5),
+        ("angle", 1e-4),
+        *((tip, 1e-4) for tip in TIP),
+    ):
+        np.testing.assert_allclose(theirs.links[name], ours.links[name], rtol=0, atol=within, err_msg=name)
+    assert np.max(np.abs(ours.links["tip_transverse"][:, 1])) > 2e-3
 
 
 def test_a_coupler_of_two_sections_moves_as_with_second_order_geometry(bar):
@@ -157,7 +161,7 @@ def test_a_coupler_of_two_sections_moves_as_with_second_order_geometry(bar):
     assert distance(ours, plain) > 1e-4
     assert theirs.figures["energy_balance_max"] < 2e-6
     for name in ("kinetic_energy", "strain_energy", "work"):
-        np.testing.assert_allclose(getattr(theirs, name), getattr(ours, name), rtol=0, atol=1e-5, err_msg=name)
+        np.testing.assert_allclose(theirs.links[name], ours.links[name], rtol=0, atol=1e-5, err_msg=name)
 
 
 def test_a_rigid_linkage_follows_the_plan():
@@ -167,15 +171,15 @@ def test_a_rigid_linkage_follows_the_plan():
     errors = []
     for step in (2e-4, 1e-4):
         theirs = simulate_exudyn(task, "+++", ExudynOptions(step=step, tolerance=1e-8))
-        errors.append(np.max(np.abs(theirs.angle - motion.q[:, 2::3])))
+        errors.append(np.max(np.abs(theirs.links["angle"] - motion.q[:, 2::3])))
         scale = (step / 1e-4) ** 2
-        np.testing.assert_allclose(theirs.rate, motion.v[:, 2::3], rtol=0, atol=5e-4 * scale)
-        np.testing.assert_allclose(theirs.acceleration, motion.a[:, 2::3], rtol=0, atol=0.1 * scale)
-        np.testing.assert_allclose(theirs.joint_force, ours.joint_force, rtol=0, atol=5e-3 * scale)
+        np.testing.assert_allclose(theirs.links["angular_velocity"], motion.v[:, 2::3], rtol=0, atol=5e-4 * scale)
+        np.testing.assert_allclose(theirs.links["angular_acceleration"], motion.a[:, 2::3], rtol=0, atol=0.1 * scale)
+        np.testing.assert_allclose(theirs.links["joint_force"], ours.links["joint_force"], rtol=0, atol=5e-3 * scale)
         for mine, other in zip(ours.end_effector, theirs.end_effector, strict=True):
             np.testing.assert_allclose(other, mine, rtol=0, atol=2e-3 * scale)
-        for name in ("chord", "chord_rate", "points", "tip"):
-            np.testing.assert_allclose(getattr(theirs, name), getattr(ours, name), rtol=0, atol=5e-4 * scale)
+        for name in ("chord_angle", "chord_velocity", "point_position", *TIP):
+            np.testing.assert_allclose(theirs.links[name], ours.links[name], rtol=0, atol=5e-4 * scale)
     assert errors[0] < 2e-4
     assert errors[1] == pytest.approx(errors[0] / 4, rel=0.1)
 
@@ -188,8 +192,8 @@ def test_rigid_bodies_and_springs_are_the_same_in_both(bar):
     theirs = simulate_exudyn(task, "+++", FINE)
     solution = task.simulate("+++", options=IntegrationOptions(tolerance=1e-7)).solution
     angles = [body.angle for body in task.system.bodies]
-    np.testing.assert_allclose(theirs.angle, solution.q[:, angles], rtol=0, atol=1e-5)
-    np.testing.assert_allclose(theirs.strain_energy, solution.strain_energy, rtol=0, atol=1e-5)
+    np.testing.assert_allclose(theirs.links["angle"], solution.q[:, angles], rtol=0, atol=1e-5)
+    np.testing.assert_allclose(theirs.links["strain_energy"], solution.strain_energy, rtol=0, atol=1e-5)
     assert solution.strain_energy.max() > 3e-3
 
 
@@ -204,8 +208,8 @@ def test_of_a_task_in_segments_the_uncut_mechanism_is_simulated(bar):
     options = ExudynOptions(step=1e-3)
     whole, cut = (simulate_exudyn(task, "+++", options) for task in (bar, bar.in_segments(3)))
     assert cut.task is bar
-    np.testing.assert_array_equal(cut.points, whole.points)
-    np.testing.assert_array_equal(cut.joint_force, whole.joint_force)
+    for name in ("point_position", "joint_force"):
+        np.testing.assert_array_equal(cut.links[name], whole.links[name])
 
 
 def test_raparm_moves_as_with_second_order_geometry(raparm, square):
@@ -217,7 +221,7 @@ def test_raparm_moves_as_with_second_order_geometry(raparm, square):
     assert strayed > 1e-4
     # Our tolerance is 1 um; the cubic elements and the step cost 0.1 um each.
     assert distance(ours, theirs) < 1e-6
-    balance = theirs.figures["energy_balance_max"] / theirs.kinetic_energy.max()
+    balance = theirs.figures["energy_balance_max"] / theirs.links["kinetic_energy"].max()
     assert balance < 1e-4
 
 
@@ -266,7 +270,7 @@ def test_a_run_that_does_not_converge(raparm, square, capfd, tmp_path, monkeypat
     k = error.partial.end_effector.position.shape[0]
     assert k == error.moment.step + 1 < 11
     assert error.moment.time == pytest.approx(0.07 * error.moment.step)
-    assert error.partial.angle.shape == (k, 8)
+    assert error.partial.links["angle"].shape == (k, 8)
     assert error.partial.torque.shape == (11, 4)
 
 
@@ -284,7 +288,7 @@ def test_a_run_prints_nothing_and_leaves_nothing_behind(bar, capfd, tmp_path, mo
     assert exudyn.config.GetDictionary() == before
     assert capfd.readouterr() == ("", "")
     assert not list(tmp_path.iterdir())
-    np.testing.assert_array_equal(first.points, second.points)
+    np.testing.assert_array_equal(first.links["point_position"], second.links["point_position"])
 
 
 @pytest.mark.parametrize(

@@ -31,7 +31,7 @@ from paraflex.plots.labels import plain
 from paraflex.plots.sources import open_source
 from paraflex.plots.svg import sketch
 from paraflex.results.export import _write_table, export, export_table
-from paraflex.results.spreadsheet import spreadsheet_table
+from paraflex.results.tables import spreadsheet_table
 from paraflex.studies import load_sweep, sweep
 from paraflex.writing import read_json, write_json
 from processes import run, started

@@ -13,8 +13,8 @@ import xarray as xr
 
 from journals import rows_in
 from paraflex.interrupts import uninterrupted
-from paraflex.results.parquet import write_parquet
 from paraflex.results.storage import write_results
+from paraflex.results.tables import write_parquet
 from processes import started, wait_until
 
 if os.name != "posix":

@@ -17,7 +17,7 @@ from paraflex.errors import InputError, NumericalError, ProportionError, printab
 from paraflex.files import library_text
 from paraflex.limits import solvable
 from paraflex.mechanism import PointRef, RevoluteJoint, RigidBody
-from paraflex.results.spreadsheet import spreadsheet_table, spreadsheet_text
+from paraflex.results.tables import spreadsheet_table, spreadsheet_text
 from shell import paraflex
 
 ROD = """

@@ -20,8 +20,7 @@ from paraflex.findings import Finding
 from paraflex.mechanism import Assembly, Geometry, Mechanism, PointForce, PointRef, WeldJoint
 from paraflex.motion import simulate_motion
 from paraflex.results import motion_dataset, motion_summary, summary, tracking_dataset
-from paraflex.results.findings import finding_lines
-from paraflex.results.validity import validity_line, validity_summary
+from paraflex.results.findings import finding_lines, validity_line, validity_summary
 from paraflex.validity import FOURTH_ORDER_LIMIT, Following, Validity, assess, fourth_order
 from test_given_shapes import as_modal
 

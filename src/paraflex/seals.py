@@ -65,7 +65,7 @@ def check_seal(file: Path, remedy: str) -> None:
 
 def unreadable(error: OSError, file: Path, remedy: str = "check its permissions") -> InputError:
     """Return the error for a file that cannot be read, with the reason that the system gives."""
-    return InputError(f"cannot be read ({error.strerror or error})", field=str(file), remedy=remedy)
+    return wrong_file(file, f"cannot be read ({error.strerror or error})", remedy)
 
 
 def check_regular(file: Path) -> None:
@@ -76,7 +76,12 @@ def check_regular(file: Path) -> None:
 
 def damaged(file: Path, why: str, remedy: str) -> InputError:
     """Return the error for a file that was changed or cut off after it was written."""
-    return InputError(f"damaged: {why}", field=str(file), remedy=remedy)
+    return wrong_file(file, f"damaged: {why}", remedy)
+
+
+def wrong_file(file: Path, problem: str, remedy: str) -> InputError:
+    """Return the error for a file or folder that cannot be used."""
+    return InputError(problem, field=str(file), remedy=remedy)
 
 
 def _state(stream: BinaryIO) -> tuple[bool, bool]:

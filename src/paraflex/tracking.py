@@ -34,7 +34,7 @@ from paraflex.dynamics import (
     still_signals,
     undeformed_motion,
 )
-from paraflex.dynamics.points import marker_place
+from paraflex.dynamics.points import PointMotion, marker_place, point_motion
 from paraflex.errors import InputError, IntegrationError, ResultWarning, as_enum
 from paraflex.findings import Finding, warn_of
 from paraflex.integrators import IntegrationOptions, Method, Solution, check_times, choose, integrate
@@ -242,6 +242,23 @@ class TrackingRun(Shown):
         return self.torques.mode
 
     @property
+    def system(self) -> System:
+        """Equations of motion of the mechanism."""
+        return self.task.system
+
+    @property
+    def samples(self) -> int:
+        """Number of the task's sample times that the run reached; the state at an event is one more."""
+        return self.solution.t.size - bool(self.solution.event)
+
+    @cached_property
+    def end_effector(self) -> PointMotion:
+        """Motion of the end-effector at the sample times reached."""
+        effector, k, solution = self.task.mechanism.end_effector, self.samples, self.solution
+        assert effector is not None
+        return point_motion(self.system, effector.point, solution.q[:k], solution.v[:k], solution.a[:k])
+
+    @property
     def applied(self) -> Array:
         """Torques of all motors at the task's sample times, or at the k ones reached if motors were held [N m]."""
         return self.torques.evaluate(self.task.motion.t) if self.holding is None else self.holding
@@ -279,9 +296,7 @@ class TrackingRun(Shown):
     @cached_property
     def driven(self) -> Driven | None:
         """Path, largest torques and condition number, if torques drive the mechanism along the path; else None."""
-        task, solution = self.task, self.solution
-        # The state at an event is one sample more than the times of the task.
-        k = solution.t.size - bool(solution.event)
+        task, solution, k = self.task, self.solution, self.samples
         effector = task.mechanism.end_effector
         if effector is None or not self.follows or not k:
             return None

@@ -27,11 +27,8 @@ STRESS = DisplayUnit("MPa", 1e-6)
 PERCENT = DisplayUnit("%", 100.0)
 # What motors and prescribed motions apply, by unit.
 EFFORTS = {"N m": "torque", "N": "force"}
-
-
-def printed_unit(unit: str) -> DisplayUnit:
-    """Return the unit of a quantity in printed tables: MPa for stresses, empty for plain numbers, else the SI unit."""
-    return STRESS if unit == "Pa" else DisplayUnit("" if unit == "1" else unit, 1.0)
+# Unit of the rate of a joint, by the unit of the effort that drives it.
+RATES = {"N m": "rad/s", "N": "m/s"}
 
 
 class Unit(NamedTuple):

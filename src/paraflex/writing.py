@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Any
 
 from paraflex.errors import InputError, OutputError
-from paraflex.seals import check_regular, damaged, seal, unreadable, unsealed
+from paraflex.seals import check_regular, damaged, seal, unreadable, unsealed, wrong_file
 
 ELSEWHERE = "choose another folder"
 # Key of a JSON file under which the digest of all other entries is stored.
@@ -140,7 +140,7 @@ def read_json(file: Path, remedy: str = "run the same command again") -> dict[st
     """
     found = read_values(file, remedy)
     if not isinstance(found, dict):
-        raise InputError("not a file that paraflex wrote", field=str(file), remedy=remedy)
+        raise wrong_file(file, "not a file that paraflex wrote", remedy)
     return found
 
 

@@ -15,7 +15,7 @@ from paraflex.campaign.tables import EARLIER, RESULTS, SCHEMA_KEY, UNFINISHED, w
 from paraflex.errors import InputError, ResultWarning, warn_user
 from paraflex.folders import STUDY_OF_RUNS, ResultsFolder, check_listed, files_of, foreign_files, hold_folder
 from paraflex.folders.changes import check_inside
-from paraflex.results.parquet import read_parquet
+from paraflex.results.tables import read_parquet
 from paraflex.seals import damaged
 from paraflex.writing import GO_ON, read_values, write_json
 

@@ -13,8 +13,7 @@ import xarray as xr
 from paraflex.campaign.journal import JOURNAL, Journal, Row, read_journal
 from paraflex.errors import InputError, ResultWarning, warn_user
 from paraflex.interrupts import uninterrupted
-from paraflex.results.parquet import open_parquet, read_parquet
-from paraflex.results.spreadsheet import spreadsheet_table
+from paraflex.results.tables import open_parquet, read_parquet, spreadsheet_table
 from paraflex.seals import damaged
 from paraflex.writing import GO_ON, whole_file
 

@@ -189,7 +189,7 @@ def print_titled(console: Console, title: str, table: Table) -> None:
 
 def validity(console: Console, verdicts: Mapping[str, Any]) -> None:
     """Print that the models of all runs are valid, if they are."""
-    from paraflex.results.validity import validity_line
+    from paraflex.results.findings import validity_line
 
     if line := validity_line(verdicts):
         console.print(line, soft_wrap=True)

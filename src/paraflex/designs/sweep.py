@@ -43,8 +43,8 @@ from paraflex.errors import InputError
 from paraflex.files import Model, model_from
 from paraflex.folders import check_inside
 from paraflex.results.metrics import VALIDITY, Members
-from paraflex.results.parquet import read_parquet
 from paraflex.results.storage import write_results
+from paraflex.results.tables import read_parquet
 from paraflex.writing import GO_ON, write_json
 
 RunTask = Callable[..., Outcome]

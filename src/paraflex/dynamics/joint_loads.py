@@ -76,6 +76,8 @@ def joint_parts(system: System, name: str) -> JointParts:
 def joint_loads(system: System, names: Sequence[str], q: Array, multipliers: Array, torques: Array) -> JointLoads:
     """Return forces and moments in joints: of constraints, motors, springs, dampers, friction and gears.
 
+    All arrays may have complex steps.
+
     The second body exerts the opposite on the first at the same position. Springs and dampers between points (linear
     springs) are not part of a joint and are not included.
 
@@ -92,7 +94,8 @@ def joint_loads(system: System, names: Sequence[str], q: Array, multipliers: Arr
     torques : (k, motors) array
         Torque or force of every motor.
     """
-    force, moment = np.zeros((len(q), len(names), 2)), np.zeros((len(q), len(names)))
+    kind = np.result_type(q, multipliers, torques)
+    force, moment = np.zeros((len(q), len(names), 2), kind), np.zeros((len(q), len(names)), kind)
     for i, name in enumerate(names):
         force[:, i], moment[:, i] = load_in(system, name, joint_parts(system, name), q, multipliers, torques)
     return JointLoads(force, moment)

@@ -24,9 +24,10 @@ from paraflex.engines.common import check_dwell, check_engine, import_engine, st
 from paraflex.errors import InputError, IntegrationError, Moment
 from paraflex.interrupts import uninterrupted
 from paraflex.mechanism import ActuationMode, Body, FlexibleBeam, Joint, Mechanism, PointRef, TorsionalSpring
-from paraflex.results.drawing import Drawing, drawing
-from paraflex.results.links import stacked_motions
-from paraflex.results.outlines import outlines
+from paraflex.results.drawing import Drawing, drawing, drawing_variables
+from paraflex.results.links import Links, point_variables, tip_variables
+from paraflex.results.numbers import single
+from paraflex.results.outlines import chord_deflections, outlines
 from paraflex.results.record import Record
 from paraflex.tracking import TrackingTask
 
@@ -406,10 +407,9 @@ def _record(
     samples = steps.thinned(substeps)
     effector = mechanism.end_effector
     assert effector is not None
+    count, drawn = len(samples.t), _drawing(mechanism, linkage, samples)
     angle, rate, acceleration = np.stack([link.frame(samples) for link in links], axis=-1)
     chord, chord_rate, _ = np.stack([link.chord(samples) for link in links], axis=-1)
-    motions = [link.motion(point, samples) for link in links for point in link.points]
-    points = stacked_motions(motions, len(samples.t))
     kinetic = np.sum([link.kinetic_energy(samples) for link in links], axis=0)
     strain = np.sum([link.strain_energy(samples) for link in links], axis=0)
     strain += _spring_energy(linkage, mechanism, samples)
@@ -424,24 +424,27 @@ def _record(
         torque=torques.evaluate(task.motion.t),
         condition=actuation_condition(task.effort, torques.mode),
         end_effector=linkage.motion(effector.point, samples),
-        angle=angle,
-        rate=rate,
-        acceleration=acceleration,
-        chord=chord,
-        chord_rate=chord_rate,
-        tip=np.stack([link.tip(samples) for link in links], axis=1),
-        points=points.position,
-        point_velocity=points.velocity,
-        point_acceleration=points.acceleration,
-        # Sign: Exudyn's multipliers are on the left-hand side of the equations, with the constraint p_b - p_a.
-        joint_force=-samples.multipliers[:, model.rows],
-        joint_moment=np.full((len(samples.t), len(mechanism.joints)), np.nan),
-        multiplier=np.full((len(samples.t), task.system.m), np.nan),
-        motor_speed=_motor_speeds(linkage, mechanism, samples),
-        kinetic_energy=kinetic,
-        strain_energy=strain,
-        work=work,
-        drawing=_drawing(mechanism, linkage, samples),
+        links=Links(
+            variables={
+                "angle": (("body",), angle),
+                "angular_velocity": (("body",), rate),
+                "angular_acceleration": (("body",), acceleration),
+                "chord_angle": (("body",), chord),
+                "chord_velocity": (("body",), chord_rate),
+                **tip_variables([link.tip(samples) for link in links]),
+                "deflection": (("body",), chord_deflections(mechanism, drawn.shape)),
+                **point_variables([link.motion(point, samples) for link in links for point in link.points], count),
+                # Sign: Exudyn's multipliers are on the left-hand side of the equations, with the constraint p_b - p_a.
+                "joint_force": (("joint", "axis"), -samples.multipliers[:, model.rows]),
+                "joint_moment": (("joint",), np.full((count, len(mechanism.joints)), np.nan)),
+                "multiplier": (("row",), np.full((count, task.system.m), np.nan)),
+                "motor_speed": (("motor",), _motor_speeds(linkage, mechanism, samples)),
+                "kinetic_energy": ((), kinetic),
+                "strain_energy": ((), strain),
+                "work": ((), work),
+                **drawing_variables(drawn, keep=single),
+            }
+        ),
         figures={
             **figures,
             "constraint_position_max": _largest(gaps[:, 0]),

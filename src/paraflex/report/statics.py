@@ -19,11 +19,10 @@ from paraflex.report.film import NO_SHAPES, Animation, animation, frames_of
 from paraflex.report.page import Page
 from paraflex.report.provenance import asked, command_line, verdict_word
 from paraflex.report.text import sections
-from paraflex.results.findings import finding_lines, verdict_of
+from paraflex.results.findings import finding_lines, validity_line, verdict_of
 from paraflex.results.kinds import check_kind
 from paraflex.results.statics_data import statics_summary
 from paraflex.results.statics_steps import as_samples, step_kinds
-from paraflex.results.validity import validity_line
 
 Array = NDArray[np.float64]
 

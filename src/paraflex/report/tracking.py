@@ -23,11 +23,10 @@ from paraflex.report.loads import load_tables, load_tiles
 from paraflex.report.page import Page
 from paraflex.report.provenance import asked, command_line, common_facts, summary_beside, verdict_word
 from paraflex.report.text import sections
-from paraflex.results.findings import finding_lines, finished, verdict_of
+from paraflex.results.findings import finding_lines, finished, validity_line, validity_summary, verdict_of
 from paraflex.results.following import headline
 from paraflex.results.kinds import check_kind
 from paraflex.results.loads import load_figures
-from paraflex.results.validity import validity_line, validity_summary
 
 
 def report_of_folder(data: xr.Dataset, folder: Path) -> Page:

@@ -10,7 +10,7 @@ from .following import (
 from .kinds import kind_of as kind_of
 from .linear_data import linear_dataset as linear_dataset
 from .linear_summary import linear_summary as linear_summary
-from .motion_data import motion_dataset as motion_dataset, motion_summary as motion_summary
+from .motion_data import motion_dataset as motion_dataset
 from .reduction_data import reduction_dataset as reduction_dataset
 from .reduction_summary import reduction_summary as reduction_summary
 from .statics_data import statics_dataset as statics_dataset, statics_summary as statics_summary
@@ -20,4 +20,4 @@ from .storage import (
     results_file as results_file,
     save_results as save_results,
 )
-from .summary import summary as summary
+from .summary import motion_summary as motion_summary, summary as summary

@@ -12,7 +12,7 @@ import xarray as xr
 
 from paraflex.errors import InputError
 from paraflex.results.formulas import largest_norm
-from paraflex.results.numbers import finite_or_none, largest
+from paraflex.results.numbers import finite_or_none, largest, name_units
 
 if TYPE_CHECKING:
     from paraflex.control.loop.run_loop import ControllerRecord
@@ -23,12 +23,12 @@ CONTROLLERS = "controllers"
 INTERNAL = "internal_torque"
 # Dimensions of a controller NAME, as KIND_NAME; the coordinate of SAMPLE holds the sample times.
 SAMPLE, INPUT, OUTPUT = "sample", "input", "output"
-# Variables of a controller, as KIND_NAME: dimension in addition to that of samples, and meaning.
+# Variables of a controller, as KIND_NAME: dimension in addition to that of samples, field of its record, and meaning.
 READINGS, REQUESTED, APPLIED = "reading", "wanted_torque", "given_torque"
 _VARIABLES = {
-    READINGS: (INPUT, "reading of a sensor that the law receives, quantised and filtered"),
-    REQUESTED: (OUTPUT, "torque of the law"),
-    APPLIED: (OUTPUT, "torque within the limits"),
+    READINGS: (INPUT, "readings", "reading of a sensor that the law receives, quantised and filtered"),
+    REQUESTED: (OUTPUT, "requested", "torque of the law"),
+    APPLIED: (OUTPUT, "applied", "torque within the limits"),
 }
 _ACTS = "acts after the delay, from one sample to the next; on the joint's second body, as `torque`"
 
@@ -127,27 +127,21 @@ def _controller(
     labels = {INPUT: inputs, OUTPUT: outputs}
     out = xr.Dataset(coords={dimension(SAMPLE, name): first.t})
     out[dimension(SAMPLE, name)].attrs = {"long_name": f"times of samples of controller {name}", "units": "s"}
-    for variable, (kind, meaning) in _VARIABLES.items():
+    for variable, (kind, field, meaning) in _VARIABLES.items():
         values = np.full((len(runs), first.t.size, len(labels[kind])), np.nan)
         for row, one in zip(values, runs, strict=True):
             if one is not None:
                 columns = [list(labels[kind]).index(label) for label in (one.inputs if kind == INPUT else one.outputs)]
-                row[: one.t.size, columns] = {READINGS: one.readings, REQUESTED: one.requested, APPLIED: one.applied}[
-                    variable
-                ]
+                row[: one.t.size, columns] = getattr(one, field)
         dims = ("mode", dimension(SAMPLE, name), dimension(kind, name))
         units = list(labels[kind].values())
         array = xr.DataArray(values, {dims[2]: list(labels[kind])}, dims)
-        array.attrs = _attributes(f"{meaning}, controller {name}", units, "" if kind == INPUT else _ACTS)
+        array.attrs["long_name"] = f"{meaning}, controller {name}"
+        name_units(array, list(dict.fromkeys(units)), units)
+        array.attrs |= {} if kind == INPUT else {"comment": _ACTS}
         array.attrs |= {"period": first.period, "delay": first.delay}
         out[dimension(variable, name)] = array
     return out, _about(done, outputs) | {"inputs": inputs, "outputs": outputs}
-
-
-def _attributes(meaning: str, units: Sequence[str], comment: str) -> dict[str, str]:
-    several = dict.fromkeys(units)
-    each = {"units_each": ", ".join(units)} if len(several) > 1 else {}
-    return {"long_name": meaning, "units": ", ".join(several)} | each | ({"comment": comment} if comment else {})
 
 
 def _about(done: Sequence[ControllerRecord], outputs: Mapping[str, str]) -> dict[str, Any]:

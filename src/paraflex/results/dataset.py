@@ -16,20 +16,19 @@ from paraflex.integrators import IntegrationOptions
 from paraflex.kinematics import Path, length_fraction
 from paraflex.results.acting import load_variables
 from paraflex.results.controllers import INTERNAL, with_controllers
-from paraflex.results.findings import MODE, keep_findings
+from paraflex.results.findings import MODE, keep_findings, validity_variables
 from paraflex.results.following import KEPT_METRICS, ErrorSpan, PathPart, metric_variables, too_short
+from paraflex.results.kinds import BRAKE_ENERGY, RUN_FIGURES
 from paraflex.results.labelled import (
     Variables,
     error_variables,
     label,
     link_coordinates,
-    link_variables,
     padded,
     provenance,
     with_totals,
 )
-from paraflex.results.record import BRAKE_ENERGY, RUN_FIGURES, Record, record
-from paraflex.results.validity import validity_variables
+from paraflex.results.record import Record, record
 from paraflex.tracking import TrackingRun
 from paraflex.validity import implausible_numbers
 
@@ -82,7 +81,7 @@ def tracking_dataset(
         name: (("mode", "time", *dims), np.stack([padded(frame[name][1], motion.t.size) for frame in frames]))
         for name, (dims, _) in frames[0].items()
     }
-    errors = [error_variables(one) for one in records]
+    errors = [error_variables(one.links) for one in records]
     if all(errors):
         data |= {
             name: (("mode", *dims), np.stack([one[name][1] for one in errors])) for name, (dims, _) in errors[0].items()
@@ -108,7 +107,11 @@ def tracking_dataset(
     data[BRAKE_ENERGY] = (("mode",), np.array([one.figures.get(BRAKE_ENERGY, 0.0) for one in records]))
     for name, values in validity_variables([one.validity for one in records]).items():
         data[name] = (("mode",), values)
-    coordinates = {"mode": [one.mode for one in records], "time": motion.t, **link_coordinates(task.system, records[0])}
+    coordinates = {
+        "mode": [one.mode for one in records],
+        "time": motion.t,
+        **link_coordinates(task.system, records[0].links),
+    }
     out = with_totals(xr.Dataset(data, coords=coordinates))
     out = out.assign(metric_variables(out, KEPT_METRICS, task.path.duration))
     label(out, mechanism)
@@ -145,7 +148,7 @@ def _frame(one: Record) -> Variables:
         "end_effector_acceleration": (("axis",), one.end_effector.acceleration),
         "torque": (("motor",), one.torque),
         "actuation_condition": ((), one.condition),
-        **link_variables(one, one.task.mechanism),
+        **one.links.variables,
     }
 
 

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from paraflex.arrays import Array, Complex
+from paraflex.arrays import Array, Complex, Numbers
 from paraflex.dynamics import System, material_angle
 from paraflex.errors import InputError
 from paraflex.mechanism import GROUND, Body, Joint, Mechanism, PointRef, Pose, Relation, RigidBody, placed_poses
@@ -154,18 +154,23 @@ def drawing_data(mechanism: Mechanism, one: Drawing, time: Array) -> xr.Dataset:
     )  # fmt: skip
 
 
-def drawing_variables(one: Drawing) -> dict[str, tuple[tuple[str, ...], Array]]:
-    """Return the variables of a drawing: dimensions besides time, and values (k, ...); springs if there are any."""
-    springs = {"spring_position": (("spring", "end", "axis"), one.springs)} if one.springs.size else {}
-    return {
+def drawing_variables(
+    one: Drawing, keep: Callable[[Array], Numbers] = np.asarray
+) -> dict[str, tuple[tuple[str, ...], Numbers]]:
+    """Return the variables of a drawing: dimensions besides time, and values (k, ...); springs if there are any.
+
+    The function `keep` converts the values; by default they are unchanged.
+    """
+    found = {
         "shape": (("station", "axis"), one.shape),
         "shape_base": (("station", "axis"), one.base),
         "joint_position": (("joint", "axis"), one.joints),
         "joint_base": (("joint", "axis"), one.joint_bases),
         "joint_direction": (("joint",), one.directions),
         "joint_direction_base": (("joint",), one.direction_bases),
-        **springs,
+        "spring_position": (("spring", "end", "axis"), one.springs),
     }
+    return {name: (dims, keep(values)) for name, (dims, values) in found.items() if values.size or "spring" not in dims}
 
 
 def drawing_coordinates(mechanism: Mechanism) -> dict[str, Any]:

@@ -20,9 +20,8 @@ from paraflex.folders import RESULT_KINDS, added_to
 from paraflex.results.beam_stresses import SECTION
 from paraflex.results.controllers import SAMPLE, controller_names, controller_variables, dimension
 from paraflex.results.kinds import kind_of
-from paraflex.results.parquet import read_parquet, write_parquet
-from paraflex.results.spreadsheet import spreadsheet_table
 from paraflex.results.storage import save_results
+from paraflex.results.tables import read_parquet, spreadsheet_table, write_parquet
 from paraflex.writing import whole_file
 
 if TYPE_CHECKING:
@@ -159,22 +158,19 @@ def export(data: xr.Dataset, output: str | Path, to: str, *, shapes: bool = Fals
         raise InputError(
             f"does not have the ending of {to}", field="output", value=str(output), remedy=f"end it in {ending}"
         )
-    if to in ("mat", "netcdf"):
-        file = output if single else output / f"results{ending}"
-        _refuse([file], force)
-        with _added(file) as unfinished:
-            if to == "mat":
-                _write_mat({"results": matlab_struct(data)}, unfinished)
-            else:
-                save_results(data, unfinished)
-        return [file]
-    tables = result_tables(data, shapes=shapes and not single)
+    whole = to in ("mat", "netcdf")
+    tables: dict[str, Any] = {"results": None} if whole else result_tables(data, shapes=shapes and not single)
     names = [next(iter(tables))] if single else tables
     files = {name: output if single else output / f"{name}{ending}" for name in names}
     _refuse(list(files.values()), force)
     for name, file in files.items():
         with _added(file) as unfinished:
-            _write_table(tables[name], unfinished, to, {key: _plain(value) for key, value in data.attrs.items()})
+            if to == "mat":
+                _write_mat({"results": matlab_struct(data)}, unfinished)
+            elif to == "netcdf":
+                save_results(data, unfinished)
+            else:
+                _write_table(tables[name], unfinished, to, {key: _plain(value) for key, value in data.attrs.items()})
     return list(files.values())
 
 

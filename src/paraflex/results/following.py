@@ -192,9 +192,8 @@ def too_short(end: float, path_duration: float) -> bool:
 def part_run(data: xr.Dataset) -> PathPart | None:
     """Return the part of the path that the runs of a dataset covered; None if they reached its end."""
     end, path = float(data["time"].values[-1]), float(data.attrs.get("motion_end", 0.0))
-    if "path_length_run" not in data.attrs or not too_short(end, path):
-        return None
-    return PathPart(end, path, float(data.attrs["path_length_run"]))
+    covered = data.attrs.get("path_length_run")
+    return PathPart(end, path, float(covered)) if covered is not None and too_short(end, path) else None
 
 
 @checked_arguments()

@@ -28,8 +28,8 @@ def during_motion(t: Numbers, motion_end: float) -> NDArray[np.bool_]:
 
 
 def length(vectors: Numbers) -> Numbers:
-    """Return the lengths (k,) of vectors (k, 2)."""
-    return np.sqrt(vectors[:, 0] ** 2 + vectors[:, 1] ** 2)
+    """Return the lengths (...,) of vectors (..., 2)."""
+    return np.sqrt(vectors[..., 0] ** 2 + vectors[..., 1] ** 2)
 
 
 def largest_norm(vectors: Numbers) -> float:
@@ -42,11 +42,6 @@ def rms(values: Numbers) -> Any:
     if len(values) == 0:
         return np.full(values.shape[1:], np.nan)[()]
     return np.sqrt(np.mean(values**2, axis=0))
-
-
-def integral(t: Numbers, values: Numbers) -> Any:
-    """Return the integral over time by the trapezoidal rule."""
-    return np.sum(0.5 * (values[1:] + values[:-1]) * np.diff(t))
 
 
 def drift_speed(t: Numbers, position: Numbers) -> Any:

@@ -27,7 +27,7 @@ _MOST_LISTED = 20
 def tracking_run_html(run: TrackingRun) -> str:
     """Return the view of a run along a path: status, tracking error, torques, deflection and counts of the solver."""
     task, solution = run.task, run.solution
-    whole = task if task.whole is None else task.whole
+    whole = task.whole or task
     torque = run.applied
     peaks, rms = np.max(np.abs(torque), axis=0, initial=0.0), np.sqrt(np.mean(torque**2, axis=0))
     motors = [
@@ -93,9 +93,7 @@ def _ended(solution: Solution) -> str:
 
 
 def _tracking(run: TrackingRun) -> list[tuple[str, Any]]:
-    task, solution = run.task, run.solution
-    # The state at an event is one sample in addition to the task's times.
-    if task.mechanism.end_effector is None or solution.t.size == bool(solution.event):
+    if run.task.mechanism.end_effector is None or not run.samples:
         return []
     traces = run_traces(run)
 
@@ -114,8 +112,7 @@ def _tracking(run: TrackingRun) -> list[tuple[str, Any]]:
 
 def _deflection(run: TrackingRun | MotionRun) -> str | None:
     """Return the largest deflection of any flexible body from its chord as text; None if there is none."""
-    system = run.task.system if isinstance(run, TrackingRun) else run.system
-    bent = np.abs(deflections(system, run.solution.q))
+    bent = np.abs(deflections(run.system, run.solution.q))
     return _text(np.nanmax(bent), "m") if np.isfinite(bent).any() else None
 
 

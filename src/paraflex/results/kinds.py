@@ -10,6 +10,24 @@ from paraflex.arguments import checked_arguments, named_in_errors
 from paraflex.errors import InputError
 from paraflex.folders import RESULT_KINDS
 
+# Names of the figures on the course of a run, which every record has.
+RUN_FIGURES = (
+    "status",
+    "message",
+    "steps",
+    "rejected",
+    "newton_iterations",
+    "factorisations",
+    "wall_time",
+    "constraint_position_max",
+    "constraint_velocity_max",
+    "energy_balance_max",
+    "event",
+    "event_time",
+)
+# Energy absorbed by brakes, if there were any.
+BRAKE_ENERGY = "brake_energy"
+
 named_in_errors(
     "a dataset of results", "a dataset: what tracking_dataset or open_results returns, or the data of a study"
 )(xr.Dataset)

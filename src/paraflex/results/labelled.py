@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from importlib.metadata import version
 from typing import Any
 
@@ -14,11 +14,11 @@ from paraflex.dynamics import System
 from paraflex.integrators import IntegrationOptions
 from paraflex.mechanism import Mechanism
 from paraflex.results.beam_stresses import largest_stresses
-from paraflex.results.drawing import drawing_coordinates, drawing_variables
+from paraflex.results.drawing import drawing_coordinates
+from paraflex.results.findings import VALIDITY_UNITS
 from paraflex.results.links import Links
 from paraflex.results.metrics import METRICS
-from paraflex.results.numbers import single
-from paraflex.results.outlines import chord_deflections
+from paraflex.results.numbers import name_units
 from paraflex.results.sensors import READING, SENSOR
 from paraflex.results.storage import origin
 from paraflex.results.stress import (
@@ -27,9 +27,8 @@ from paraflex.results.stress import (
     UNITS as STRESS_UNITS,
     Variables,
     section_coordinates,
-    section_variables,
 )
-from paraflex.results.validity import UNITS as VALIDITY_UNITS
+from paraflex.units import RATES
 
 UNITS = (
     {
@@ -150,50 +149,6 @@ _COMMENTS = {
 _TORQUES = ("torque", "internal_torque", "peak_torque", "rms_torque", "applied_torque")
 
 
-def link_variables(links: Links, mechanism: Mechanism) -> Variables:
-    """Return the variables of the links of a mechanism at the samples reached: dimensions besides time, and values."""
-    return {
-        "angle": (("body",), links.angle),
-        "angular_velocity": (("body",), links.rate),
-        "angular_acceleration": (("body",), links.acceleration),
-        "chord_angle": (("body",), links.chord),
-        "chord_velocity": (("body",), links.chord_rate),
-        "tip_axial": (("body",), links.tip[:, :, 0]),
-        "tip_transverse": (("body",), links.tip[:, :, 1]),
-        "tip_slope": (("body",), links.tip[:, :, 2]),
-        "deflection": (("body",), chord_deflections(mechanism, links.drawing.shape)),
-        "point_position": (("point", "axis"), links.points),
-        "point_velocity": (("point", "axis"), links.point_velocity),
-        "point_acceleration": (("point", "axis"), links.point_acceleration),
-        "joint_force": (("joint", "axis"), links.joint_force),
-        "joint_moment": (("joint",), links.joint_moment),
-        "multiplier": (("row",), links.multiplier),
-        "motor_speed": (("motor",), links.motor_speed),
-        "kinetic_energy": ((), links.kinetic_energy),
-        "strain_energy": ((), links.strain_energy),
-        "work": ((), links.work),
-        **{name: (dims, single(x)) for name, (dims, x) in drawing_variables(links.drawing).items()},
-        **_load_variables(links, mechanism),
-    }
-
-
-def _load_variables(links: Links, mechanism: Mechanism) -> Variables:
-    """Return variables that only some models have: joint coordinates, drives, frame loads, sensors, section forces."""
-    out: Variables = {}
-    for name, dim in (("joint_coordinate", "joint"), ("joint_speed", "joint"), ("drive_torque", "drive"),
-                      ("drive_speed", "drive")):  # fmt: skip
-        values = getattr(links, name)
-        if values is not None and (dim == "joint" or values.shape[1]):
-            out[name] = ((dim,), values)
-    if links.frame_load is not None:
-        out |= {"frame_force": (("axis",), links.frame_load.force), "frame_moment": ((), links.frame_load.moment)}
-    if links.sensors is not None and links.sensors.shape[1]:
-        out[READING] = ((SENSOR,), links.sensors)
-    if links.sections is not None:
-        out |= section_variables(links.sections, [body.name for body in mechanism.bodies])
-    return out
-
-
 def error_variables(links: Links) -> Variables:
     """Return bounds of the integration errors of joint and drive loads in a run; empty if they are unknown."""
     if links.load_errors is None:
@@ -232,9 +187,9 @@ def link_coordinates(system: System, links: Links) -> dict[str, Any]:
         "motor": [motor.name for motor in mechanism.motors],
         "row": list(system.described_rows),
         **drawing_coordinates(mechanism),
-        **({SENSOR: sensors} if sensors and links.sensors is not None else {}),
-        **({"drive": drives} if drives and links.drive_torque is not None else {}),
-        **({} if links.sections is None else section_coordinates(links.sections.sections)),
+        **({SENSOR: sensors} if READING in links.variables else {}),
+        **({"drive": drives} if "drive_torque" in links.variables else {}),
+        **({} if links.sections is None else section_coordinates(links.sections)),
     }
 
 
@@ -263,20 +218,12 @@ def _name_efforts(data: xr.Dataset, units: Iterable[str], speed: str, names: Ite
     """Write units of torques or forces and of their joints' speeds; `units_each` if there are both kinds, in order."""
     each = list(units)
     units = sorted(set(each), reverse=True) or ["N m"]
-    speeds = {"N m": "rad/s", "N": "m/s"}
     if speed in data:
-        data[speed].attrs["units"] = ", ".join(speeds[unit] for unit in units)
+        data[speed].attrs["units"] = ", ".join(RATES[unit] for unit in units)
     for name in (each for each in names if each in data):
         name_units(data[name], units, each)
         if units == ["N"]:
             data[name].attrs["long_name"] = data[name].attrs["long_name"].replace("torque", "force")
-
-
-def name_units(array: xr.DataArray, units: Sequence[str], each: Sequence[str]) -> None:
-    """Write the units of a variable; if there are several, also `units_each`, one for each label in their order."""
-    array.attrs["units"] = ", ".join(units)
-    if len(units) > 1:
-        array.attrs["units_each"] = ", ".join(each)
 
 
 def provenance(

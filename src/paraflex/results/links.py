@@ -6,11 +6,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from paraflex.arrays import Array
 from paraflex.dynamics import Marker, System, end_markers, joint_coordinate, material_angle, sensor_readings
 from paraflex.dynamics.joint_loads import (
-    FrameLoad,
     LoadErrors,
     drive_torques,
     frame_load,
@@ -19,86 +19,48 @@ from paraflex.dynamics.joint_loads import (
     undetermined_loads,
 )
 from paraflex.dynamics.points import PointMotion, marker_motion, point_motion, tip_deflection
+from paraflex.dynamics.sections import Sections
 from paraflex.integrators import Solution
 from paraflex.mechanism import FIRST_END, LAST_END, PointRef
-from paraflex.results.drawing import Drawing, system_drawing
-from paraflex.results.numbers import stacked
-from paraflex.results.stress import SectionResult, section_result
+from paraflex.results.drawing import drawing_variables, system_drawing
+from paraflex.results.numbers import single, stacked
+from paraflex.results.outlines import chord_deflections
+from paraflex.results.sensors import READING, SENSOR
+from paraflex.results.stress import Variables, section_result, section_variables
 
 
 @dataclass(frozen=True, kw_only=True)
 class Links:
-    """Motion and loads at the k sample times that a run reached; NaN where a model has no value.
+    """Motion and loads of bodies, points, joints and motors at the k sample times that a run reached.
 
     Bodies, joints and points are those of the mechanism in its order, even if the model divides bodies into parts.
-    Points are all named points of all bodies, body after body.
+    Points are all named points of all bodies, body after body. Values are NaN where a model has none.
 
     Attributes
     ----------
-    angle, rate, acceleration : (k, bodies) arrays
-        Angles of the body frames and their derivatives; in a model without body frames those of the tangent at a beam's
-        first end [rad, rad/s, rad/s^2].
-    chord, chord_rate : (k, bodies) arrays
-        Angle and rate of the line from a beam's first end to its last, which does not depend on the choice of frame; of
-        a modal body from its first point to its last, minus the angle undeformed; of a rigid body its angle [rad,
-        rad/s].
-    tip : (k, bodies, 3) array
-        Axial and transverse displacement and slope of a beam's last end (a modal body's last point) relative to the
-        tangent at its first end [m, m, rad].
-    points, point_velocity, point_acceleration : (k, points, 2) arrays
-        Positions [m], velocities [m/s] and accelerations [m/s^2] of the points.
-    joint_force : (k, joints, 2) array
-        Total force of a joint's first body on its second, at the joint's point of the second, in the ground frame [N].
-    joint_moment : (k, joints) array
-        Total moment about that point, positive anticlockwise [N m].
-    multiplier : (k, rows) array
-        Multipliers of the constraint rows of the mechanism's system, NaN for rows that the model does not have; minus
-        the multiplier acts on the second body.
-    motor_speed : (k, motors) array
-        Rate of each motor's joint [rad/s], or speed along its axis [m/s].
-    kinetic_energy, strain_energy, work : (k,) arrays
-        Energies, and work done on the mechanism [J].
-    drawing : Drawing
-        Deformed shapes of all bodies.
-    joint_coordinate, joint_speed : (k, joints) arrays, optional
-        Angle of each joint [rad], or travel along its axis [m], and its rate; None for models without them.
-    drive_torque, drive_speed : (k, drives) arrays, optional
-        Torque [N m] or force [N] of each prescribed motion on its joint's second body, and the rate of that joint.
+    variables : mapping of str to (tuple of str, array)
+        Variables of a dataset by name: dimensions besides time, and values (k, ...). Units and signs are those of the
+        dataset's attributes (see `labelled`). Every model has angles and their derivatives, of the tangent at a beam's
+        first end in a model without body frames; angle and rate of the chord, the line from a beam's first end to its
+        last, which does not depend on the choice of frame (of a modal body from its first point to its last, minus the
+        angle undeformed; of a rigid body its angle); displacements and slope of a beam's last end (a modal body's last
+        point) relative to the tangent at its first end; motion of the points; forces and moments of joints; multipliers
+        of the constraint rows of the mechanism's system; speeds of motors; energies and work; deformed shapes. Only
+        some models have coordinates of joints, torques and speeds of prescribed motions, loads on the ground, section
+        forces and readings of sensors.
     load_errors : LoadErrors, optional
         Bounds of the integration errors of joint and drive loads; None if unknown.
-    frame_load : FrameLoad, optional
-        Force and moment of the mechanism on the ground.
-    sections : SectionResult, optional
-        Section forces of beams; None for models without shape functions, and without flexible beams.
-    sensors : (k, sensors) array, optional
-        Readings of the mechanism's sensors, each in its unit; NaN for sensors without a meaning in the model.
+    sections : Sections, optional
+        Sections of the beams; None for models without shape functions, and without flexible beams.
     """
 
-    angle: Array
-    rate: Array
-    acceleration: Array
-    chord: Array
-    chord_rate: Array
-    tip: Array
-    points: Array
-    point_velocity: Array
-    point_acceleration: Array
-    joint_force: Array
-    joint_moment: Array
-    multiplier: Array
-    motor_speed: Array
-    kinetic_energy: Array
-    strain_energy: Array
-    work: Array
-    drawing: Drawing
-    joint_coordinate: Array | None = None
-    joint_speed: Array | None = None
-    drive_torque: Array | None = None
-    drive_speed: Array | None = None
+    variables: Variables
     load_errors: LoadErrors | None = None
-    frame_load: FrameLoad | None = None
-    sections: SectionResult | None = None
-    sensors: Array | None = None
+    sections: Sections | None = None
+
+    def __getitem__(self, name: str) -> NDArray[np.floating]:
+        """Return the values (k, ...) of a variable."""
+        return self.variables[name][1]
 
 
 def system_links(system: System, solution: Solution, torques: Array, samples: int) -> Links:
@@ -121,48 +83,65 @@ def system_links(system: System, solution: Solution, torques: Array, samples: in
     first = [system.body(names[0]).angle for names in parts]
     chords = [_chord(system, names, q, v) for names in parts]
     named = [PointRef(body.name, point) for body in mechanism.bodies for point in body.points]
-    points = stacked_motions([point_motion(system, ref, q, v, a) for ref in named], samples)
     multipliers = solution.multipliers[:samples]
     coordinates = {joint.name: joint_coordinate(system, joint.name, q, v) for joint in mechanism.joints}
     joints, errors = [joint.name for joint in mechanism.joints], solution.multiplier_errors
     loads = joint_loads(system, joints, q, multipliers, torques[:samples])
     shared = undetermined_loads(system, joints, q, solution.acting)
     drawn = system_drawing(system, q)
+    frame = frame_load(system, drawn.joints, loads, q, v)
+    drives, sensors = mechanism.prescribed, [one.name for one in mechanism.sensors]
+    found = section_result(system, q, v, a, multipliers)
+    variables: Variables = {
+        "angle": (("body",), q[:, first]),
+        "angular_velocity": (("body",), v[:, first]),
+        "angular_acceleration": (("body",), a[:, first]),
+        "chord_angle": (("body",), np.stack([angle for angle, _ in chords], axis=1)),
+        "chord_velocity": (("body",), np.stack([rate for _, rate in chords], axis=1)),
+        **tip_variables([_tip(system, names, q) for names in parts]),
+        "deflection": (("body",), chord_deflections(mechanism, drawn.shape)),
+        **point_variables([point_motion(system, ref, q, v, a) for ref in named], samples),
+        "joint_force": (("joint", "axis"), np.where(shared.force, np.nan, loads.force)),
+        "joint_moment": (("joint",), np.where(shared.moment, np.nan, loads.moment)),
+        "multiplier": (("row",), _by_name(multipliers, system.rows, system.described_rows)),
+        "motor_speed": (("motor",), stacked([coordinates[motor.joint].rate for motor in mechanism.motors], samples)),
+        **{name: ((), getattr(solution, name)[:samples]) for name in ("kinetic_energy", "strain_energy", "work")},
+        **drawing_variables(drawn, keep=single),
+        "joint_coordinate": (("joint",), stacked([each.value for each in coordinates.values()], samples)),
+        "joint_speed": (("joint",), stacked([each.rate for each in coordinates.values()], samples)),
+    }
+    if drives:
+        torque = np.where(shared.drive, np.nan, drive_torques(system, multipliers))[:, : len(drives)]
+        variables["drive_torque"] = (("drive",), torque)
+        variables["drive_speed"] = (("drive",), stacked([coordinates[one.joint].rate for one in drives], samples))
+    variables |= {"frame_force": (("axis",), frame.force), "frame_moment": ((), frame.moment)}
+    if sensors:
+        readings = sensor_readings(system, q, v, a, multipliers, torques[:samples])
+        given = [one.name for one in system.mechanism.sensors]
+        variables[READING] = ((SENSOR,), _by_name(readings, given, sensors))
+    if found is not None:
+        variables |= section_variables(found, [body.name for body in mechanism.bodies])
     return Links(
-        angle=q[:, first],
-        rate=v[:, first],
-        acceleration=a[:, first],
-        chord=np.stack([angle for angle, _ in chords], axis=1),
-        chord_rate=np.stack([rate for _, rate in chords], axis=1),
-        tip=np.stack([_tip(system, names, q) for names in parts], axis=1),
-        points=points.position,
-        point_velocity=points.velocity,
-        point_acceleration=points.acceleration,
-        joint_force=np.where(shared.force, np.nan, loads.force),
-        joint_moment=np.where(shared.moment, np.nan, loads.moment),
-        multiplier=_by_name(multipliers, system.rows, system.described_rows),
-        motor_speed=stacked([coordinates[motor.joint].rate for motor in mechanism.motors], samples),
-        kinetic_energy=solution.kinetic_energy[:samples],
-        strain_energy=solution.strain_energy[:samples],
-        work=solution.work[:samples],
-        drawing=drawn,
-        joint_coordinate=stacked([each.value for each in coordinates.values()], samples),
-        joint_speed=stacked([each.rate for each in coordinates.values()], samples),
-        drive_torque=np.where(shared.drive, np.nan, drive_torques(system, multipliers))[:, : len(mechanism.prescribed)],
-        drive_speed=stacked([coordinates[one.joint].rate for one in mechanism.prescribed], samples),
+        variables=variables,
         load_errors=None if errors is None else load_errors(system, joints, errors),
-        frame_load=frame_load(system, drawn.joints, loads, q, v),
-        sections=section_result(system, q, v, a, multipliers),
-        sensors=_by_name(
-            sensor_readings(system, q, v, a, multipliers, torques[:samples]),
-            *([one.name for one in each.sensors] for each in (system.mechanism, mechanism)),
-        ),
+        sections=None if found is None else found.sections,
     )
 
 
-def stacked_motions(points: Sequence[PointMotion], samples: int) -> PointMotion:
-    """Stack the motions of several points to three arrays (samples, points, 2)."""
-    return PointMotion(*(stacked([each[k] for each in points], samples, 2) for k in range(3)))
+def tip_variables(tips: Sequence[Array]) -> Variables:
+    """Return the variables of axial and transverse displacements and slopes (k, 3) of the last end of each body."""
+    parts = np.stack(tips, axis=-1).swapaxes(0, 1)
+    return {
+        f"tip_{name}": (("body",), part) for name, part in zip(("axial", "transverse", "slope"), parts, strict=True)
+    }
+
+
+def point_variables(points: Sequence[PointMotion], samples: int) -> Variables:
+    """Return the variables of the motions of several points."""
+    return {
+        f"point_{name}": (("point", "axis"), stacked([getattr(one, name) for one in points], samples, 2))
+        for name in PointMotion._fields
+    }
 
 
 def _by_name(values: Array, names: Sequence[str], order: Sequence[str]) -> Array:

@@ -12,11 +12,9 @@ from numpy.typing import NDArray
 from paraflex.findings import RESOLVED
 from paraflex.formatting import display_unit, error_text, number, quantity, speed_text
 from paraflex.results.numbers import finite_or_none, largest, units_of_each
-from paraflex.units import EFFORTS
+from paraflex.units import EFFORTS, RATES
 
 Figures = dict[str, float | str | None]
-# Unit of the rate of a joint, by the unit of the effort that drives it.
-_RATES = {"N m": "rad/s", "N": "m/s"}
 # Variables of beams, and the keys that differ from their names.
 OF_BEAMS = ("stress_max", "stress_place", "stress_time", "bending_stress_max", "axial_stress_max", "safety_factor")
 _NAMES = {"stress_place": "place", "stress_time": "time"}
@@ -62,7 +60,7 @@ def load_figures(run: xr.Dataset) -> dict[str, Any]:
             out[group] = {
                 str(name): {
                     "torque_unit": unit,
-                    "speed_unit": None if unit is None else _RATES[unit],
+                    "speed_unit": None if unit is None else RATES[unit],
                     **_most("torque", run, torque, {dim: name}),
                     **_most("speed", run, f"{dim}_speed", {dim: name}),
                     **_most("power", run, f"{dim}_power", {dim: name}),
@@ -124,7 +122,7 @@ def load_text(figures: Mapping[str, Any], load: str, unit: str, digits: int = 4)
 
 def _units(efforts: xr.DataArray, number: int) -> list[str | None]:
     """Return the unit of each torque or force; None if it is not known which of the two it is."""
-    return [unit if unit in _RATES else None for unit in units_of_each(efforts, number)]
+    return [unit if unit in RATES else None for unit in units_of_each(efforts, number)]
 
 
 def _joint(one: xr.Dataset, *, slides: bool) -> Figures:

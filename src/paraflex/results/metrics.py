@@ -17,7 +17,7 @@ import numpy as np
 from paraflex.errors import InputError
 from paraflex.mechanism import rotor_mass
 from paraflex.mechanism.quantities import known
-from paraflex.results.formulas import drift_speed, integral, largest_norm, overshoot, rms, settling_time, vibration
+from paraflex.results.formulas import drift_speed, largest_norm, overshoot, rms, settling_time, vibration
 from paraflex.results.traces import Trace
 from paraflex.units import WHERE_IT_SLIDES
 
@@ -220,7 +220,7 @@ def _of_currents(formula: Callable[[Electrical], Any]) -> Formula:
     """Return the formula of a value per motor from currents and voltages, NaN without samples."""
 
     def value(run: Any, _: Any) -> Any:
-        found = run.electrical
+        found = run.run.electrical
         return formula(found) if found.t.size else np.full(len(found.motors), np.nan)
 
     return value
@@ -331,7 +331,7 @@ _ALL = (
     Metric("work", "work done on the mechanism until the end, less what dampers take", "J",
            _absolute(lambda x: x.solution.work[-1])),
     Metric("motor_energy", "integral of the magnitudes of all motors' powers, from the samples", "J",
-           lambda run, nominal: integral(run.t, np.sum(np.sign(nominal.power) * run.power, axis=1)),
+           lambda run, nominal: np.trapezoid(np.sum(np.sign(nominal.power) * run.power, axis=1), run.t),
            "energy of the motors", of_motors=True),
     Metric("motor_power_max", "largest magnitude of any motor's power", "W",
            _largest_magnitude(lambda x: x.power), "largest motor power", of_motors=True),

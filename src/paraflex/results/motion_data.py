@@ -16,27 +16,20 @@ from paraflex.integrators import IntegrationOptions
 from paraflex.integrators.methods import title_of
 from paraflex.motion import MotionRun
 from paraflex.results.acting import load_variables
-from paraflex.results.controllers import controller_figures, with_controllers
-from paraflex.results.findings import keep_findings, verdict_of
-from paraflex.results.kinds import check_kind
+from paraflex.results.controllers import with_controllers
+from paraflex.results.findings import keep_findings, validity_variables
+from paraflex.results.kinds import RUN_FIGURES
 from paraflex.results.labelled import (
     Variables,
     error_variables,
     label,
     link_coordinates,
-    link_variables,
     padded,
     provenance,
     with_totals,
 )
 from paraflex.results.links import system_links
-from paraflex.results.loads import load_figures
-from paraflex.results.numbers import by_label, finite_or_none
-from paraflex.results.record import RUN_FIGURES
-from paraflex.results.reduced_runs import reduced_run_figures
-from paraflex.results.sensors import sensor_figures
-from paraflex.results.validity import validity_summary, validity_variables
-from paraflex.validity import implausible_numbers
+from paraflex.validity import beyond_range, implausible_numbers
 
 
 @checked_arguments()
@@ -75,7 +68,7 @@ def motion_dataset(
     values: Variables = {
         "coordinate_value": (("coordinate",), q),
         "coordinate_rate": (("coordinate",), v),
-        **link_variables(links, mechanism),
+        **links.variables,
     }  # fmt: skip
     data: dict[str, Any] = {
         name: (("time", *dims), padded(each, run.times.size)) for name, (dims, each) in values.items()
@@ -102,47 +95,5 @@ def motion_dataset(
     }
     if isinstance(run, ControlledMotion):
         out = with_controllers(out, [run.controllers], [motor.name for motor in mechanism.motors])
-    beyond = [] if run.validity is None or run.validity.holds else [run.validity.finding()]
-    keep_findings(out, [*findings, *implausible_numbers(mechanism), *beyond, *run.findings])
+    keep_findings(out, [*findings, *implausible_numbers(mechanism), *beyond_range(run.validity), *run.findings])
     return out
-
-
-@checked_arguments()
-def motion_summary(data: xr.Dataset) -> dict[str, Any]:
-    """Return the results of a run without a path as plain numbers for JSON.
-
-    `final` holds the last sample that the run reached, with time None if it reached none.
-
-    Raises
-    ------
-    InputError
-        The dataset is of another kind.
-    """
-    check_kind(data, "motion")
-    reached = np.flatnonzero(np.isfinite(data["angle"].values).all(axis=1))
-    last = data.isel(time=reached[-1] if reached.size else 0)
-    numbers: dict[str, Any] = {name: data[name].item() for name in RUN_FIGURES}
-    numbers = {key: finite_or_none(x) if isinstance(x, float) else x for key, x in numbers.items()}
-    return {
-        "mechanism": data.attrs["mechanism"],
-        "status": numbers.pop("status"),
-        "message": numbers.pop("message"),
-        "loads": load_figures(data),
-        **numbers,
-        "verdict": verdict_of(data).to_dict(),
-        "validity": validity_summary(data),
-        **sensor_figures(data),
-        **reduced_run_figures(data),
-        **controller_figures(data),
-        "singular_positions": json.loads(data.attrs["singular_positions"]),
-        "final": {
-            "time": float(last["time"]) if reached.size else None,
-            "angle": by_label(last["angle"], "body"),
-            "point_position": {
-                str(point): [finite_or_none(x) for x in last["point_position"].sel(point=point).values]
-                for point in data["point"].values
-            },
-        },
-        "parameters": json.loads(data.attrs["parameters"]),
-        "version": data.attrs["paraflex_version"],
-    }

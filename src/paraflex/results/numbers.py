@@ -36,6 +36,13 @@ def units_of_each(array: xr.DataArray, number: int) -> list[str]:
     return each if len(each) == number and each != [""] else [str(array.attrs.get("units", ""))] * number
 
 
+def name_units(array: xr.DataArray, units: Sequence[str], each: Sequence[str]) -> None:
+    """Write the units of a variable; if there are several, also `units_each`, one for each label in their order."""
+    array.attrs["units"] = ", ".join(units)
+    if len(units) > 1:
+        array.attrs["units_each"] = ", ".join(each)
+
+
 def by_label(values: xr.DataArray, dim: str) -> dict[str, float | None]:
     """Return the numbers of an array by the labels of its dimension for JSON, None for those that are not finite."""
     return {str(name): finite_or_none(values.sel({dim: name}).item()) for name in values[dim].values}

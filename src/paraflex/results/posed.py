@@ -129,7 +129,12 @@ def _assembled(mechanism: Mechanism, assembly: str | None, path: tuple[str, Path
     found = closure_of(rigid, chosen)
     if found.state is None:
         q = reference_pose(rigid, chosen)
-        return _open(_of(mechanism, rigid, chosen.name, q[None], path), rigid, q, found.problem)
+        phi = rigid.constraints(moment_signals(rigid.mechanism, 0.0), 0.0, q)[0]
+        # The unit of a joint's gap is that of its row with the largest residual.
+        rows = [rigid.rows[k] for k in np.argsort(np.abs(phi))]
+        units = {joint_of_row(row): row_unit(row) for row in rows}
+        gaps = {name: f"{gap:.3g} {units[name]}" for name, gap in joint_gaps(rigid, phi).items() if gap > _CLOSED}
+        return replace(_of(mechanism, rigid, chosen.name, q[None], path, (found.problem,)), gaps=gaps)
     if path is None:
         return _of(mechanism, rigid, chosen.name, found.state.q[None])
     try:
@@ -166,27 +171,13 @@ def _of(
     data = drawing_data(mechanism, system_drawing(system, q), np.arange(len(q), dtype=float))
     angles = {body.name: float(q[0][system.body(body.name).angle]) for body in mechanism.bodies}
     drawn = Posed(mechanism, assembly, data, problems=problems, angles=angles)
-    drawn = replace(drawn, payload=_payload(drawn))
+    carried, effector = mechanism.payload, mechanism.end_effector
+    if carried is not None and effector is not None:
+        # The offset is rotated with the rigid body that carries the payload.
+        angle = angles[effector.point.body]
+        turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+        drawn = replace(drawn, payload=drawn.place(effector.point) + turn @ np.array(carried.offset))
     if path is None:
         return drawn
     name, followed = path
     return replace(drawn, path=name, desired=followed.evaluate(np.linspace(0.0, followed.duration, _PLACES)).position)
-
-
-def _payload(drawn: Posed) -> Array | None:
-    """Return the centre of mass of the payload, whose offset is rotated with the rigid body that carries it."""
-    carried, effector = drawn.mechanism.payload, drawn.mechanism.end_effector
-    if carried is None or effector is None:
-        return None
-    angle = drawn.angles[effector.point.body]
-    turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
-    return drawn.place(effector.point) + turn @ np.array(carried.offset)
-
-
-def _open(drawn: Posed, rigid: System, q: Array, problem: str) -> Posed:
-    phi = rigid.constraints(moment_signals(rigid.mechanism, 0.0), 0.0, q)[0]
-    # The unit of a joint's gap is that of its row with the largest residual.
-    rows = [rigid.rows[k] for k in np.argsort(np.abs(phi))]
-    units = {joint_of_row(row): row_unit(row) for row in rows}
-    gaps = {name: f"{gap:.3g} {units[name]}" for name, gap in joint_gaps(rigid, phi).items() if gap > _CLOSED}
-    return replace(drawn, gaps=gaps, problems=(problem,))

@@ -3,42 +3,25 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field
 from typing import Any
 
 from paraflex.arguments import named_in_errors
 from paraflex.arrays import Array
 from paraflex.control.loop.run_loop import ControllerRecord
 from paraflex.control.loop.runs import ControlledTracking
-from paraflex.dynamics.points import PointMotion, point_motion
+from paraflex.dynamics.points import PointMotion
 from paraflex.findings import Finding
 from paraflex.integrators import IntegrationOptions
+from paraflex.results.kinds import BRAKE_ENERGY, RUN_FIGURES
 from paraflex.results.links import Links, system_links
 from paraflex.tracking import TrackingRun, TrackingTask
 from paraflex.validity import Validity
 
-# Names of the figures on the course of a run, which every record has.
-RUN_FIGURES = (
-    "status",
-    "message",
-    "steps",
-    "rejected",
-    "newton_iterations",
-    "factorisations",
-    "wall_time",
-    "constraint_position_max",
-    "constraint_velocity_max",
-    "energy_balance_max",
-    "event",
-    "event_time",
-)
-# Energy absorbed by brakes, if there were any.
-BRAKE_ENERGY = "brake_energy"
-
 
 @named_in_errors("a record", "what results.record makes of a run")
 @dataclass(frozen=True, kw_only=True)
-class Record(Links):
+class Record:
     """Run of a task, link by link.
 
     Attributes
@@ -56,6 +39,8 @@ class Record(Links):
         Condition number of the actuation matrix.
     end_effector : PointMotion
         Position, velocity and acceleration of the end-effector, three (k, 2) arrays.
+    links : Links
+        Motion and loads of bodies, points, joints and motors.
     figures : mapping
         Values of the figures named in RUN_FIGURES.
     validity : Validity, optional
@@ -74,6 +59,7 @@ class Record(Links):
     torque: Array
     condition: Array
     end_effector: PointMotion
+    links: Links
     figures: Mapping[str, Any] = field(default_factory=dict)
     validity: Validity | None = None
     findings: tuple[Finding, ...] = ()
@@ -83,22 +69,16 @@ class Record(Links):
 
 def record(run: TrackingRun) -> Record:
     """Return the record of a run; finite segments are reported as the links they divide."""
-    task, solution, torque = run.task, run.solution, run.applied
-    # The state at an event is one sample in addition to the task's times.
-    k = solution.t.size - bool(solution.event)
-    whole = task if task.whole is None else task.whole
-    effector = task.mechanism.end_effector
-    assert effector is not None
-    links = system_links(task.system, solution, torque, k)
+    solution, torque = run.solution, run.applied
     return Record(
-        **{each.name: getattr(links, each.name) for each in fields(Links)},
-        task=whole,
+        task=run.task.whole or run.task,
         method=run.method,
         options=solution.options,
         mode=run.mode.name,
         torque=torque,
         condition=run.condition,
-        end_effector=point_motion(task.system, effector.point, solution.q[:k], solution.v[:k], solution.a[:k]),
+        end_effector=run.end_effector,
+        links=system_links(run.system, solution, torque, run.samples),
         figures={name: getattr(solution, name) for name in (*RUN_FIGURES, BRAKE_ENERGY)},
         validity=run.validity,
         findings=run.findings,

@@ -9,7 +9,6 @@ from typing import Generic, TypeVar, overload
 
 import numpy as np
 
-from paraflex.actuation import Electrical
 from paraflex.control.laws.joints import internal_torques
 from paraflex.control.loop.run_loop import ControllerRecord
 from paraflex.control.loop.runs import ControlledMotion, ControlledTracking
@@ -18,12 +17,10 @@ from paraflex.dynamics.joint_loads import (
     LoadErrors,
     UndeterminedLoads,
     drive_torques,
-    joint_parts,
+    joint_loads,
     load_errors,
-    load_in,
     undetermined_loads,
 )
-from paraflex.dynamics.points import point_motion
 from paraflex.equilibria.conditions import Coordinate
 from paraflex.equilibria.result import Statics
 from paraflex.integrators import Solution
@@ -48,7 +45,7 @@ class SolutionTraces(Generic[R]):
     @property
     def system(self) -> System:
         """System of the run."""
-        raise NotImplementedError
+        return self.run.system
 
     @property
     def solution(self) -> Solution:
@@ -93,26 +90,20 @@ class SolutionTraces(Generic[R]):
         Multipliers near singular positions, where they have a pole, are taken as zero. The force is NaN if redundant
         constraints share it.
         """
-        system, solution = self.system, self.solution
-        multipliers = np.where(np.isnan(solution.multipliers), 0.0, solution.multipliers)
-        forces = [
-            load_in(system, joint.name, joint_parts(system, joint.name), solution.q, multipliers, self.torque)[0]
-            for joint in system.described.joints
-        ]
-        shared = self._undetermined.force.any(axis=2)
-        return np.where(shared, np.nan, stacked([length(each) for each in forces], len(solution.q)))
+        multipliers = np.where(np.isnan(self.solution.multipliers), 0.0, self.solution.multipliers)
+        force = joint_loads(self.system, self._joints, self.solution.q, multipliers, self.torque).force
+        return np.where(self._undetermined.force.any(axis=2), np.nan, length(force))
 
     @cached_property
     def load_errors(self) -> LoadErrors:
         """Bounds of the integration errors of joint and drive loads; NaN if unknown."""
         errors = self.solution.multiplier_errors
-        joints = [joint.name for joint in self.system.described.joints]
-        return load_errors(self.system, joints, np.full(self.system.m, np.nan) if errors is None else errors)
+        return load_errors(self.system, self._joints, np.full(self.system.m, np.nan) if errors is None else errors)
 
     @cached_property
     def joint_speed(self) -> Trace:
         """Rate of every joint's angle [rad/s], or travel [m/s] (k, joints)."""
-        return self._of_joints([joint.name for joint in self.system.described.joints])
+        return self._of_joints(self._joints)
 
     @property
     def controllers(self) -> tuple[ControllerRecord, ...]:
@@ -121,8 +112,11 @@ class SolutionTraces(Generic[R]):
 
     @cached_property
     def _undetermined(self) -> UndeterminedLoads:
-        names = [joint.name for joint in self.system.described.joints]
-        return undetermined_loads(self.system, names, self.solution.q.real, self.solution.acting)
+        return undetermined_loads(self.system, self._joints, self.solution.q.real, self.solution.acting)
+
+    @property
+    def _joints(self) -> list[str]:
+        return [joint.name for joint in self.system.described.joints]
 
     def _of_joints(self, names: list[str]) -> Trace:
         """Return the rates (k, joints) of joints by name."""
@@ -142,16 +136,6 @@ class RunTraces(Traces, SolutionTraces[TrackingRun]):
     """
 
     run: TrackingRun
-
-    @property
-    def system(self) -> System:
-        """System of the run."""
-        return self.run.task.system
-
-    @property
-    def electrical(self) -> Electrical:
-        """Currents and voltages of the motors."""
-        return self.run.electrical
 
     @property
     def condition(self) -> Trace:
@@ -186,16 +170,6 @@ class MotionTraces(SolutionTraces[MotionRun]):
     t: Trace
     torque: Trace
     run: MotionRun
-
-    @property
-    def system(self) -> System:
-        """System of the run."""
-        return self.run.system
-
-    @property
-    def electrical(self) -> Electrical:
-        """Currents and voltages of the motors."""
-        return self.run.electrical
 
 
 @dataclass(frozen=True)
@@ -284,14 +258,8 @@ def run_traces(run: TrackingRun | MotionRun | Statics) -> RunTraces | MotionTrac
     """Return the traces of a run at the samples that it reached."""
     if isinstance(run, Statics):
         return StaticsTraces(run)
-    solution = run.solution
     if isinstance(run, MotionRun):
-        return MotionTraces(solution.t, run.applied, run)
-    task = run.task
-    # The state at an event is one sample in addition to the task's times.
-    k = solution.t.size - bool(solution.event)
-    effector = task.mechanism.end_effector
-    assert effector is not None
-    position = point_motion(task.system, effector.point, solution.q[:k], solution.v[:k], solution.a[:k]).position
+        return MotionTraces(run.solution.t, run.applied, run)
+    task, k, position = run.task, run.samples, run.end_effector.position
     distance = length(position - task.motion.desired.position[:k])
-    return RunTraces(solution.t[:k], task.path.duration, position, distance, run.applied, run)
+    return RunTraces(run.solution.t[:k], task.path.duration, position, distance, run.applied, run)

@@ -13,16 +13,15 @@ from paraflex.arguments import checked_arguments
 from paraflex.equilibria import Statics
 from paraflex.findings import Finding
 from paraflex.results.drawing import system_drawing
-from paraflex.results.findings import keep_findings, verdict_of
+from paraflex.results.findings import keep_findings, validity_summary, validity_variables, verdict_of
 from paraflex.results.kinds import check_kind
-from paraflex.results.labelled import label, link_coordinates, link_variables, name_units, with_totals
+from paraflex.results.labelled import label, link_coordinates, with_totals
 from paraflex.results.links import system_links
-from paraflex.results.numbers import by_label, finite_or_none, single, stacked
+from paraflex.results.numbers import by_label, finite_or_none, name_units, single, stacked
 from paraflex.results.run_traces import StaticsTraces
 from paraflex.results.statics_steps import NAMED_UNITS
 from paraflex.results.storage import origin
-from paraflex.results.validity import validity_summary, validity_variables
-from paraflex.validity import implausible_numbers
+from paraflex.validity import beyond_range, implausible_numbers
 
 # Number of frequencies kept for each step.
 _FREQUENCIES = 8
@@ -87,8 +86,7 @@ def statics_dataset(
     # The extended system has the rows that hold, move or load joints, so that joint loads include their efforts.
     torques = np.zeros((len(found.equilibria), len(mechanism.motors)))
     links = system_links(found.equations.extended, found.solution, torques, len(torques))
-    values = link_variables(links, mechanism)
-    data: dict[str, Any] = {name: (("time", *dims), each) for name, (dims, each) in values.items()}
+    data: dict[str, Any] = {name: (("time", *dims), each) for name, (dims, each) in links.variables.items()}
     data |= {name: each.item() for name, each in validity_variables([found.validity]).items()}
     data |= {"status": found.status, "message": found.message}
     steps = np.arange(len(found.equilibria))
@@ -107,8 +105,7 @@ def statics_dataset(
         if name in _COMMENTS:
             out[name].attrs["comment"] = _COMMENTS[name]
     out.attrs = {"kind": "statics", "mechanism": mechanism.name, **origin(parameters)}
-    beyond = [] if found.validity is None or found.validity.holds else [found.validity.finding()]
-    keep_findings(out, [*findings, *implausible_numbers(mechanism), *beyond, *found.findings])
+    keep_findings(out, [*findings, *implausible_numbers(mechanism), *beyond_range(found.validity), *found.findings])
     return out
 
 

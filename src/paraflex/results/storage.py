@@ -12,11 +12,11 @@ import numpy as np
 import xarray as xr
 
 from paraflex.arguments import checked_arguments
-from paraflex.errors import InputError, suggestion
+from paraflex.errors import suggestion
 from paraflex.folders import DATA_FILES, check_listed
 from paraflex.interrupts import uninterrupted
 from paraflex.results.following import metric_variables
-from paraflex.seals import NETCDF, PARQUET, check_regular, check_seal, damaged, unreadable
+from paraflex.seals import NETCDF, PARQUET, check_regular, check_seal, damaged, unreadable, wrong_file
 from paraflex.writing import sealed_file
 
 # Version of the contents of datasets; all versions are readable. 2: shapes and other variables of drawings. 3: errors
@@ -34,6 +34,7 @@ _LARGE = 16384
 _PIECE = 1 << 20
 # First bytes of netCDF files: HDF5, or the classic formats.
 _NETCDF = (NETCDF, b"CDF\x01", b"CDF\x02", b"CDF\x05")
+_OURS = "name a results.nc that paraflex wrote"
 _AGAIN = "copy it again, or delete it and run the same command again"
 
 
@@ -129,25 +130,20 @@ def results_file(path: str | Path) -> Path:
     if not path.exists():
         near = [each.name for each in path.parent.iterdir()] if path.parent.is_dir() else []
         remedy = suggestion(path.name, near) if near and len(near) < 20 else "name the folder of a run"
-        raise InputError("there is no such file or folder", field=str(path), remedy=remedy)
+        raise wrong_file(path, "there is no such file or folder", remedy)
     if not path.is_dir():
         return path
     for name in FILES:
         if (path / name).is_file():
             return path / name
     if (path / "results.parquet").exists() or (path / "study.json").exists():
-        runs = sorted(path.glob(f"{_TRAJECTORIES}/*.nc"))
-        more = ", ..." if len(runs) > _MOST_NAMED else ""
-        raise InputError(
-            "the folder of a study of many runs, whose results are in results.parquet",
-            field=str(path),
-            remedy=f"name one of its runs: {', '.join(str(run.relative_to(path)) for run in runs[:_MOST_NAMED])}{more}"
-            if runs
-            else "it kept no runs: set trajectories = true in the study, or run the design you want with paraflex run",
-        )
-    raise InputError(
-        f"no results in this folder (no {' or '.join(FILES)})", field=str(path), remedy="name one that paraflex wrote"
-    )
+        runs = [str(run.relative_to(path)) for run in sorted(path.glob(f"{_TRAJECTORIES}/*.nc"))]
+        remedy = "it kept no runs: set trajectories = true in the study, or run the design you want with paraflex run"
+        if runs:
+            more = ", ..." if len(runs) > _MOST_NAMED else ""
+            remedy = f"name one of its runs: {', '.join(runs[:_MOST_NAMED])}{more}"
+        raise wrong_file(path, "the folder of a study of many runs, whose results are in results.parquet", remedy)
+    raise wrong_file(path, f"no results in this folder (no {' or '.join(FILES)})", "name one that paraflex wrote")
 
 
 def _read(file: Path) -> xr.Dataset:
@@ -158,14 +154,9 @@ def _read(file: Path) -> xr.Dataset:
     except OSError as error:
         raise unreadable(error, file) from error
     if start == PARQUET:
-        raise InputError(
-            "a table of many runs, not the results of one", field=str(file), remedy="read it with pandas or pyarrow"
-        )
+        raise wrong_file(file, "a table of many runs, not the results of one", "read it with pandas or pyarrow")
     if start not in _NETCDF:
-        raise InputError(
-            "not a netCDF file" if start else "an empty file", field=str(file),
-            remedy="name a results.nc that paraflex wrote",
-        )  # fmt: skip
+        raise wrong_file(file, "not a netCDF file" if start else "an empty file", _OURS)
     check_seal(file, _AGAIN)
     check_listed(file, _AGAIN)
     try:
@@ -179,16 +170,10 @@ def _read(file: Path) -> xr.Dataset:
 def _checked(data: xr.Dataset, file: Path) -> xr.Dataset:
     schema = data.attrs.get("schema")
     if not isinstance(schema, int | np.integer) or "paraflex_version" not in data.attrs:
-        raise InputError(
-            "a netCDF file, but not of paraflex", field=str(file), remedy="name a results.nc that paraflex wrote"
-        )
+        raise wrong_file(file, "a netCDF file, but not of paraflex", _OURS)
     if not 1 <= schema <= SCHEMA:
-        raise InputError(
-            f"written by a later version, paraflex {data.attrs['paraflex_version']} (schema {schema}; this one reads "
-            f"up to {SCHEMA})",
-            field=str(file),
-            remedy="update paraflex",
-        )
+        written = f"paraflex {data.attrs['paraflex_version']} (schema {schema}; this one reads up to {SCHEMA})"
+        raise wrong_file(file, f"written by a later version, {written}", "update paraflex")
     if schema < _FOLLOWING and "end_effector" in data:
         return data.assign(metric_variables(data))
     return data

@@ -1,24 +1,24 @@
-"""Results of a study as plain numbers: the contents of `summary.json`."""
+"""Results of runs as plain numbers: the contents of `summary.json`."""
 
 from __future__ import annotations
 
 import json
 from typing import Any
 
+import numpy as np
 import xarray as xr
 
 from paraflex.arguments import checked_arguments
 from paraflex.results.controllers import controller_figures
-from paraflex.results.findings import verdict_of
+from paraflex.results.findings import validity_summary, verdict_of
 from paraflex.results.following import FOLLOWING, ErrorSpan, part_run
-from paraflex.results.kinds import check_kind
+from paraflex.results.kinds import RUN_FIGURES, check_kind
 from paraflex.results.loads import load_figures
 from paraflex.results.metrics import METRICS
 from paraflex.results.numbers import by_label, finite_or_none
 from paraflex.results.reduced_runs import reduced_run_figures
 from paraflex.results.sensors import sensor_figures
 from paraflex.results.traces import data_traces
-from paraflex.results.validity import validity_summary
 
 _COUNTS = ("steps", "rejected", "newton_iterations", "factorisations")
 _FIGURES = (
@@ -92,6 +92,47 @@ def summary(data: xr.Dataset, failed: dict[str, str] | None = None) -> dict[str,
         "verdict": verdict_of(data).to_dict(),
         "part": None if part is None else part.to_dict(),
         "modes": modes,
+        "parameters": json.loads(data.attrs["parameters"]),
+        "version": data.attrs["paraflex_version"],
+    }
+
+
+@checked_arguments()
+def motion_summary(data: xr.Dataset) -> dict[str, Any]:
+    """Return the results of a run without a path as plain numbers for JSON.
+
+    `final` holds the last sample that the run reached, with time None if it reached none.
+
+    Raises
+    ------
+    InputError
+        The dataset is of another kind.
+    """
+    check_kind(data, "motion")
+    reached = np.flatnonzero(np.isfinite(data["angle"].values).all(axis=1))
+    last = data.isel(time=reached[-1] if reached.size else 0)
+    numbers: dict[str, Any] = {name: data[name].item() for name in RUN_FIGURES}
+    numbers = {key: finite_or_none(x) if isinstance(x, float) else x for key, x in numbers.items()}
+    return {
+        "mechanism": data.attrs["mechanism"],
+        "status": numbers.pop("status"),
+        "message": numbers.pop("message"),
+        "loads": load_figures(data),
+        **numbers,
+        "verdict": verdict_of(data).to_dict(),
+        "validity": validity_summary(data),
+        **sensor_figures(data),
+        **reduced_run_figures(data),
+        **controller_figures(data),
+        "singular_positions": json.loads(data.attrs["singular_positions"]),
+        "final": {
+            "time": float(last["time"]) if reached.size else None,
+            "angle": by_label(last["angle"], "body"),
+            "point_position": {
+                str(point): [finite_or_none(x) for x in last["point_position"].sel(point=point).values]
+                for point in data["point"].values
+            },
+        },
         "parameters": json.loads(data.attrs["parameters"]),
         "version": data.attrs["paraflex_version"],
     }

@@ -194,11 +194,8 @@ def _of_model(task: TrackingTask, span: ErrorSpan, runs: ModelRuns, reference: R
         gaps = _gaps(base.end_effector.position, reference.end_effector.position)
         out["distance_max"], out["distance_rms"] = float(gaps.max()), float(rms(gaps))
         links = [body.name for body in task.mechanism.bodies]
-        for key, one, other in (
-            ("angle", base.chord, reference.chord),
-            ("angular_velocity", base.chord_rate, reference.chord_rate),
-        ):
-            apart = np.abs(one - other)
+        for key, name in (("angle", "chord_angle"), ("angular_velocity", "chord_velocity")):
+            apart = np.abs(base.links[name] - reference.links[name])
             out[f"{key}_difference_rms"] = {link: float(rms(apart[:, i])) for i, link in enumerate(links)}
             out[f"{key}_difference_max"] = {link: float(apart[:, i].max()) for i, link in enumerate(links)}
     return out

@@ -14,9 +14,8 @@ from paraflex.figures.verification import model_table, path_extent
 from paraflex.formatting import number, quantity
 from paraflex.late import view
 from paraflex.results import summary
-from paraflex.results.findings import finding_lines, verdict_of
+from paraflex.results.findings import finding_lines, validity_line, verdict_of
 from paraflex.results.following import HEADLINE, SPAN_WORDS, ErrorSpan
-from paraflex.results.validity import validity_line
 from paraflex.studies.agreement import Verification
 from paraflex.studies.comparison import MethodComparison
 from paraflex.studies.law_comparison import LawComparison

@@ -104,7 +104,11 @@ def assess(system: System, solution: Solution, following: Following | None = Non
     return None if found is not None and found.holds and solution.status == "failed" else found
 
 
+def beyond_range(validity: Validity | None, whose: str = "") -> list[Finding]:
+    """Return the finding for a run beyond the range of its model, if it is; `whose` names it, for example "mode ++"."""
+    return [] if validity is None or validity.holds else [validity.finding(whose)]
+
+
 def warn(validity: Validity | None, whose: str = "") -> None:
-    """Issue a `ValidityWarning` if a model does not hold; `whose` names the run, for example "mode ++"."""
-    if validity is not None and not validity.holds:
-        warn_of([validity.finding(whose)], ValidityWarning)
+    """Issue a `ValidityWarning` if a model does not hold; see `beyond_range`."""
+    warn_of(beyond_range(validity, whose), ValidityWarning)

@@ -134,7 +134,7 @@ def implausible_results(
     found = [
         *stiff_modes(system),
         *_large_slopes(where, system, solution),
-        *_overstressed(where, system, solution),
+        *implausible_stresses(system, solution, where),
         *_unbalanced(where, system, solution),
         # No default method resolves axial vibrations of undamped beams: tables give the errors with the values.
         *(_begun_singular(solution, where.place) if undamped else unresolved_loads(system, solution, where.place)),
@@ -143,13 +143,8 @@ def implausible_results(
         *shared_loads(system, solution),
     ]
     if driven is not None:
-        found += [*_lost_control(where, driven), *_large_torques(where, system, driven, solution.t)]
+        found += [*_lost_control(where, driven), *implausible_torques(system, driven, solution.t, mechanism)]
     return found
-
-
-def implausible_stresses(system: System, solution: Solution) -> list[Finding]:
-    """Return findings about the stresses of equilibria or a run."""
-    return list(_overstressed(_Context("", system.described), system, solution))
 
 
 def shared_loads(system: System, solution: Solution) -> Iterator[Finding]:
@@ -176,11 +171,6 @@ def shared_loads(system: System, solution: Solution) -> Iterator[Finding]:
         )  # fmt: skip
 
 
-def implausible_torques(system: System, driven: Driven, t: Array) -> list[Finding]:
-    """Return findings about the torques and forces of a plan at times t (k,), before a run."""
-    return list(_large_torques(_Context(f"mode {driven.mode}", system.mechanism), system, driven, t))
-
-
 def _large_slopes(where: _Context, system: System, solution: Solution) -> Iterator[Finding]:
     bendings = [bending_of(system, body.name, solution) for body in system.bodies if body.nf]
     slopes = {
@@ -203,9 +193,9 @@ def _large_slopes(where: _Context, system: System, solution: Solution) -> Iterat
         )  # fmt: skip
 
 
-def _overstressed(where: _Context, system: System, solution: Solution) -> Iterator[Finding]:
-    """Yield beams stressed beyond the strength of their material."""
-    sections = sections_of(system)
+def implausible_stresses(system: System, solution: Solution, where: _Context | None = None) -> Iterator[Finding]:
+    """Yield beams of equilibria or of a run that are stressed beyond the strength of their material."""
+    where, sections = where or _Context("", system.described), sections_of(system)
     if sections is None or not np.isfinite(sections.strength).any():
         return
     loads = sections.loads(system, solution.q, solution.v, solution.a, solution.multipliers)
@@ -335,8 +325,15 @@ def _lost_control(where: _Context, driven: Driven) -> Iterator[Finding]:
         )  # fmt: skip
 
 
-def _large_torques(where: _Context, system: System, driven: Driven, t: Array) -> Iterator[Finding]:
-    mechanism = where.mechanism
+def implausible_torques(
+    system: System, driven: Driven, t: Array, mechanism: Mechanism | None = None
+) -> Iterator[Finding]:
+    """Yield large torques and forces of a plan, or of a run, at times t (k,).
+
+    The mechanism is the one that the user described, by default that of the system.
+    """
+    mechanism = mechanism or system.mechanism
+    where = _Context(f"mode {driven.mode}", mechanism)
     size = mechanism_size(mechanism) or system.size
     force, turning = _expected(system, mechanism, driven.acceleration, t)
     for motor, peak in driven.peaks.items():

@@ -22,7 +22,7 @@ from paraflex.errors import InputError, suggestion
 from paraflex.limits import DESIGNS, at_most
 from paraflex.results.metrics import METRICS
 from paraflex.results.numbers import finite_or_none
-from paraflex.results.parquet import read_parquet, write_parquet
+from paraflex.results.tables import read_parquet, write_parquet
 from paraflex.studies.optimisation.schema import StudyTable
 from paraflex.writing import GO_ON, write_json
 

@@ -26,8 +26,7 @@ from paraflex.findings import Verdict
 from paraflex.folders import SENSITIVITY
 from paraflex.mechanism.quantities import known
 from paraflex.results.numbers import finite_or_none
-from paraflex.results.parquet import write_parquet
-from paraflex.results.spreadsheet import spreadsheet_text
+from paraflex.results.tables import spreadsheet_text, write_parquet
 from paraflex.writing import whole_file
 
 if TYPE_CHECKING:
