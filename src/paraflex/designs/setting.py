@@ -13,13 +13,12 @@ from typing import Any
 
 from paraflex.designs.measure import metrics_of
 from paraflex.designs.own_motion import own_duration
-from paraflex.designs.own_statics import check_of_statics
 from paraflex.designs.samples import SweptParameter
-from paraflex.designs.schema import SweepTable, VaryTable
+from paraflex.designs.schema import SweepTable, VaryTable, check_of_statics
 from paraflex.designs.units import check_unit_of, unit_of
 from paraflex.equilibria.conditions import chosen_over
 from paraflex.errors import InputError, suggestion
-from paraflex.files import Model, library_names, model_from
+from paraflex.files import Model, StudyDefaults, library_names, model_from
 from paraflex.files.expressions import ExpressionError, evaluate
 from paraflex.files.generators import is_generated
 from paraflex.files.model import read_model
@@ -152,6 +151,10 @@ class Setting:
         model = model_from(overlaid(dict(self.data), inside), self.source, self.text)
         return model, self.options(model, chosen)
 
+    def own_study(self, model: Model) -> StudyDefaults:
+        """Return the study of a design without a path."""
+        return model.study.filled(duration=self.duration, samples=self.samples, assembly=self.assembly)
+
     def parts(self) -> dict[str, PathPart]:
         """Return the covered part of each path that runs do not complete, for the design that the file describes."""
         model = model_from(dict(self.data), self.source)
@@ -165,7 +168,7 @@ class Setting:
         """Return findings on the design that the file describes, and on paths that runs do not complete."""
         model = model_from(dict(self.data), self.source)
         parts = [part.finding(f"path.{name}") for name, part in self.parts().items()]
-        duration = None if self.has_path or self.statics else own_duration(model, self.duration)
+        duration = None if self.has_path or self.statics else own_duration(self.own_study(model))
         return Verdict([*implausible_numbers(model.mechanism, duration), *parts])
 
     def options(self, model: Model, chosen: Mapping[str, float] | None = None) -> IntegrationOptions:
@@ -355,7 +358,7 @@ def _check(setting: Setting, model: Model) -> None:
             "runs along a path start on the planned motion", field="balanced", value=True, remedy="leave it out"
         )
     if not (setting.has_path or setting.statics):
-        own_duration(model, setting.duration)
+        own_duration(setting.own_study(model))
         if model.study.reduced:
             raise InputError(
                 "few flexible coordinates are chosen from a planned path, and there is none",

@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -134,6 +135,10 @@ class Evaluate:
             raise LimitReached
         return [self.known[design] for design in designs]
 
+    def at(self, x: Array) -> EvaluatedDesign:
+        """Evaluate the design at a point of the unit cube."""
+        return self([self.study.design(x)])[0]
+
     def add_slopes(self, at: EvaluatedDesign) -> EvaluatedDesign:
         """Compute exact derivatives at a design, store them in its rows, and return the extended design."""
         assert self.run_slopes is not None
@@ -181,6 +186,37 @@ class Evaluate:
             for number, path in enumerate(setting.paths):
                 task = Task(number, self._numbers[design], design, path)
                 yield from (Job(each, task) for each in (self._single.values() if apart else (setting,)))
+
+
+@dataclass(frozen=True)
+class Session:
+    """Results of a session of a search.
+
+    Attributes
+    ----------
+    folder : Path
+        Folder of the study.
+    evaluate : Evaluate
+        Evaluator with all evaluated designs.
+    stopped : str
+        Reason of termination, as text.
+    interrupted : bool
+        Whether the user stopped the session.
+    seconds : float
+        Wall time of the session [s].
+    """
+
+    folder: Path
+    evaluate: Evaluate
+    stopped: str
+    interrupted: bool
+    seconds: float
+
+    @property
+    def start(self) -> EvaluatedDesign | None:
+        """Start of the search; None if it does not run."""
+        start = self.evaluate.known.get(self.evaluate.study.start)
+        return start if start is not None and start.complete else None
 
 
 class Job(NamedTuple):

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
-from typing import Protocol
 
 import numpy as np
 
@@ -33,18 +32,14 @@ def slope_column(column: str, parameter: str) -> str:
     return f"slope.{column}.{parameter}"
 
 
-class Slopes(Protocol):
-    """Protocol of a function that computes derivatives of the metrics of an objective or of targets."""
-
-    def __call__(self, at: EvaluatedDesign) -> Mapping[str, Array]:
-        """Compute the derivatives at a complete design, a (runs, parameters) array for each column."""
-        ...
+# Function that computes, at a complete design, the derivatives of metrics: a (runs, parameters) array for each column.
+Slopes = Callable[[EvaluatedDesign], Mapping[str, Array]]
 
 
-def slopes_of(study: DesignStudy[Result], evaluate: Evaluate) -> Slopes:
+def slopes_of(evaluate: Evaluate) -> Slopes:
     """Return exact derivatives if the evaluator computes them, else finite differences."""
-    differing = Differences(study, evaluate)
-    return differing if evaluate.run_slopes is None else ExactSlopes(study, evaluate, differing)
+    differing = Differences(evaluate)
+    return differing if evaluate.run_slopes is None else ExactSlopes(evaluate, differing)
 
 
 class Differences:
@@ -55,40 +50,39 @@ class Differences:
     the parameter (Press et al., Numerical Recipes, 5.7).
     """
 
-    def __init__(self, study: DesignStudy[Result], evaluate: Evaluate) -> None:
-        self.study = study
+    def __init__(self, evaluate: Evaluate) -> None:
         self.evaluate = evaluate
-        self.step = study.search.difference
+        self.step = evaluate.study.search.difference
 
     def __call__(self, at: EvaluatedDesign) -> Mapping[str, Array]:
         """Compute the derivatives; see `Slopes`."""
         if self.step is None:
-            self.step = float(np.clip(np.cbrt(relative_noise(self.study, self.evaluate, at)), _LEAST_STEP, _MOST_STEP))
-        return differences(self.study, self.evaluate, at, self.step)
+            self.step = float(np.clip(np.cbrt(relative_noise(self.evaluate, at)), _LEAST_STEP, _MOST_STEP))
+        return differences(self.evaluate, at, self.step)
 
 
 @dataclass
 class ExactSlopes:
     """Exact derivatives of the runs, replaced by differences at designs without them; `reasons` holds the reasons."""
 
-    study: DesignStudy[Result]
     evaluate: Evaluate
     otherwise: Slopes
     reasons: list[str] = field(default_factory=list)
 
     def __call__(self, at: EvaluatedDesign) -> Mapping[str, Array]:
         """Compute the derivatives; see `Slopes`."""
-        if not _has_slopes(self.study, at):
+        if not _has_slopes(self.evaluate.study, at):
             at = self.evaluate.add_slopes(at)
         for row in at.rows:
             if row.get(NO_SLOPES):
                 self.reasons.append(f'mode "{row["mode"]}": {row[NO_SLOPES]}')
                 return self.otherwise(at)
-        return exact_slopes(self.study, at)
+        return exact_slopes(self.evaluate.study, at)
 
 
-def relative_noise(study: DesignStudy[Result], evaluate: Evaluate, at: EvaluatedDesign) -> float:
+def relative_noise(evaluate: Evaluate, at: EvaluatedDesign) -> float:
     """Estimate the largest relative noise of a metric from closely spaced designs on a line; 0 if one does not run."""
+    study = evaluate.study
     middle = study.unit(at.design)
     # Along the diagonal, away from the nearer bounds, over the span of the smallest central difference.
     along = np.where(middle > 0.5, -1.0, 1.0) * 2.0 * _LEAST_STEP
@@ -104,15 +98,14 @@ def relative_noise(study: DesignStudy[Result], evaluate: Evaluate, at: Evaluated
     return noise
 
 
-def differences(
-    study: DesignStudy[Result], evaluate: Evaluate, at: EvaluatedDesign, step: float
-) -> Mapping[str, Array]:
+def differences(evaluate: Evaluate, at: EvaluatedDesign, step: float) -> Mapping[str, Array]:
     """Compute central differences, with all designs evaluated at once.
 
     The step is a fraction of the range. It should be large compared with the noise from the choice of time steps, and
     small compared with the curvature of the metric. At a bound, or if one of the two designs fails, the difference is
     one-sided; if both fail it is zero.
     """
+    study = evaluate.study
     middle = study.unit(at.design)
     sides = np.clip(middle[:, None] + step * np.array([-1.0, 1.0]), 0.0, 1.0)
     done = evaluate([_moved(study, at, k, x) for k in range(middle.size) for x in sides[k]])
