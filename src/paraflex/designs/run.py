@@ -79,6 +79,10 @@ class Outcome:
     trajectories: Mapping[str, xr.Dataset] = field(default_factory=dict)
 
 
+# `run_task`, or a function in its place: of the setting, a task and, in threads, a `Watch`.
+RunTask = Callable[..., Outcome]
+
+
 class Abandoned(Exception):
     """A run that was stopped on request and whose results are discarded."""
 

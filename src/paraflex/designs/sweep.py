@@ -34,7 +34,17 @@ from paraflex.campaign import (
 from paraflex.compilation import compile_kernels_for
 from paraflex.designs.measure import members_of
 from paraflex.designs.reopen import study_account
-from paraflex.designs.run import STATUS_COMPLETE, Outcome, Task, is_row_of, lost, run_id, run_task, table_schema
+from paraflex.designs.run import (
+    STATUS_COMPLETE,
+    Outcome,
+    RunTask,
+    Task,
+    is_row_of,
+    lost,
+    run_id,
+    run_task,
+    table_schema,
+)
 from paraflex.designs.samples import SweptParameter, check_varied, designs
 from paraflex.designs.schema import SweepTable, study_table
 from paraflex.designs.setting import Setting, make_setting
@@ -46,8 +56,6 @@ from paraflex.results.metrics import VALIDITY, Members
 from paraflex.results.parquet import read_parquet
 from paraflex.results.storage import write_results
 from paraflex.writing import GO_ON, write_json
-
-RunTask = Callable[..., Outcome]
 
 
 @dataclass(frozen=True)

@@ -8,11 +8,12 @@ from typing import Any, ClassVar
 
 from paraflex.arguments import checked_arguments, named_in_errors
 from paraflex.campaign import OnProgress, Workers
+from paraflex.designs.run import RunTask
 from paraflex.designs.schema import study_table
 from paraflex.designs.units import check_unit_of_metric
 from paraflex.errors import InputError, suggestion
 from paraflex.studies.optimisation.confidence import Confidence, checked, confidence
-from paraflex.studies.optimisation.evaluate import Evaluate, EvaluatedDesign, LimitReached, RunTask, Session
+from paraflex.studies.optimisation.evaluate import Evaluate, EvaluatedDesign, LimitReached, Session
 from paraflex.studies.optimisation.fit import closest, fit, residual_slopes, root_mean_square
 from paraflex.studies.optimisation.objective import Target
 from paraflex.studies.optimisation.problem import running_start

@@ -9,11 +9,12 @@ from typing import Any, ClassVar
 
 from paraflex.arguments import checked_arguments, named_in_errors
 from paraflex.campaign import OnProgress, Workers
+from paraflex.designs.run import RunTask
 from paraflex.designs.schema import study_table
 from paraflex.designs.units import check_unit_of_metric
 from paraflex.errors import InputError
 from paraflex.results.metrics import Members
-from paraflex.studies.optimisation.evaluate import Evaluate, EvaluatedDesign, RunTask, Session
+from paraflex.studies.optimisation.evaluate import Evaluate, EvaluatedDesign, Session
 from paraflex.studies.optimisation.minimise import DEFAULT_SEARCH, minimise
 from paraflex.studies.optimisation.objective import Objective
 from paraflex.studies.optimisation.problem import DesignProblem, best_of, holds_limits

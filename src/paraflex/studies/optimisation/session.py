@@ -14,10 +14,10 @@ from paraflex.campaign import OnProgress, Progress, Workers, kept_in, open_campa
 from paraflex.campaign.study import Result
 from paraflex.compilation import compile_kernels_for
 from paraflex.designs.reopen import study_account
-from paraflex.designs.run import is_row_of, run_task, table_schema
+from paraflex.designs.run import RunTask, is_row_of, run_task, table_schema
 from paraflex.designs.samples import SOBOL, designs
 from paraflex.errors import InputError
-from paraflex.studies.optimisation.evaluate import Evaluate, EvaluatedDesign, LimitReached, RunTask, Session
+from paraflex.studies.optimisation.evaluate import Evaluate, EvaluatedDesign, LimitReached, Session
 from paraflex.studies.optimisation.minimise import DEFAULT_SEARCH, WITH_SLOPES
 from paraflex.studies.optimisation.result import SearchResult
 from paraflex.studies.optimisation.slopes import (
