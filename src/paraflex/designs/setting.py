@@ -209,7 +209,7 @@ def make_setting(table: SweepTable, folder: FilePath) -> tuple[Setting, tuple[Sw
         places=tuple(_places(data, parameter.name, parameter.fields) for parameter in parameters),
         whole=tuple(parameter.whole for parameter in parameters),
         paths=paths,
-        modes=_modes(model, table.modes) if paths != (NO_PATH,) else _no_modes(table),
+        modes=_modes(model, table.modes, paths),
         duration=table.duration,
         samples=table.samples,
         assembly=table.assembly,
@@ -320,17 +320,15 @@ def _paths(model: Model, names: list[str]) -> tuple[str, ...]:
     return tuple(dict.fromkeys(names))
 
 
-def _no_modes(table: SweepTable) -> tuple[str, ...]:
-    """Return the single empty mode name of runs without a path; raise an InputError if the study has modes."""
-    if table.modes:
-        raise InputError(
-            "a mechanism without a path has no actuation modes: its torques are given", field="modes",
-            value=table.modes[0], remedy="leave it out, or add a [path.NAME] table to the mechanism's file",
-        )  # fmt: skip
-    return (NO_MODE,)
-
-
-def _modes(model: Model, names: list[str]) -> tuple[str, ...]:
+def _modes(model: Model, names: list[str], paths: tuple[str, ...]) -> tuple[str, ...]:
+    """Return the names of the modes, a single empty one for runs without a path."""
+    if paths == (NO_PATH,):
+        if names:
+            raise InputError(
+                "a mechanism without a path has no actuation modes: its torques are given", field="modes",
+                value=names[0], remedy="leave it out, or add a [path.NAME] table to the mechanism's file",
+            )  # fmt: skip
+        return (NO_MODE,)
     try:
         modes = model.modes(names)
     except InputError as error:

@@ -68,10 +68,11 @@ class EvaluatedDesign:
         return np.array([row[column] for row in self.rows], dtype=float)
 
 
+@dataclass(eq=False)
 class Evaluate:
     """Evaluator of designs, which reads existing rows from the journal instead of computing them again.
 
-    Parameters
+    Attributes
     ----------
     study : DesignStudy
         Study whose designs are evaluated.
@@ -87,26 +88,19 @@ class Evaluate:
         Function that computes exact derivatives for a task, in rows as those of `slopes.run_slopes`.
     """
 
-    def __init__(
-        self,
-        study: DesignStudy[Result],
-        journal: Journal,
-        engine: Engine,
-        run: RunTask = run_task,
-        on_evaluated: Callable[[Evaluate, EvaluatedDesign], None] | None = None,
-        run_slopes: RunTask | None = None,
-    ) -> None:
-        self.study = study
-        self.journal = journal
-        self.engine = engine
-        self.run = run
-        self.on_evaluated = on_evaluated
-        self.run_slopes = run_slopes
+    study: DesignStudy[Result]
+    journal: Journal
+    engine: Engine
+    run: RunTask = run_task
+    on_evaluated: Callable[[Evaluate, EvaluatedDesign], None] | None = None
+    run_slopes: RunTask | None = None
+
+    def __post_init__(self) -> None:
         self.known: dict[Design, EvaluatedDesign] = {}
         self.fresh: int = 0
-        self._rows = {row["id"]: row for row in checked_rows(journal)}
+        self._rows = {row["id"]: row for row in checked_rows(self.journal)}
         self._numbers: dict[Design, int] = {}
-        self._single = {mode: replace(study.setting, modes=(mode,)) for mode in study.setting.modes}
+        self._single = [replace(self.study.setting, modes=(mode,)) for mode in self.study.setting.modes]
 
     @property
     def history(self) -> list[EvaluatedDesign]:
@@ -184,7 +178,7 @@ class Evaluate:
         for design in designs:
             for number, path in enumerate(setting.paths):
                 task = Task(number, self._numbers[design], design, path)
-                yield from (Job(each, task) for each in (self._single.values() if apart else (setting,)))
+                yield from (Job(each, task) for each in (self._single if apart else (setting,)))
 
 
 @dataclass(frozen=True)

@@ -175,19 +175,19 @@ def _one(field: str, name: str | None, known: tuple[str, ...]) -> str:
     return name
 
 
+@dataclass
 class _Identifier(Solver[IdentificationResult]):
-    """Least-squares fit: best design, confidence intervals there, and kind of derivatives."""
+    """Least-squares fit: best design, confidence intervals there, kind of derivatives, and least residual so far."""
 
-    def __init__(self, study: IdentificationStudy) -> None:
-        self.study, self.targets = study, study.targets
-        self.best: EvaluatedDesign | None = None
-        self.confidence: Confidence | None = None
-        self.derivatives = ""
-        self.residual: float | None = None
+    study: IdentificationStudy
+    best: EvaluatedDesign | None = None
+    confidence: Confidence | None = None
+    derivatives: str = ""
+    residual: float | None = None
 
     def solve(self, evaluate: Evaluate) -> str:
         """Minimise the residuals from the best of the start and the initial samples; return the reason of the end."""
-        study, targets, slopes = self.study, self.targets, slopes_of(evaluate)
+        study, targets, slopes = self.study, self.study.targets, slopes_of(evaluate)
         running_start(evaluate)
         start = sampled_start(evaluate, lambda designs: closest(targets, designs))
         stopped = fit(targets, evaluate, slopes, start)
@@ -205,13 +205,13 @@ class _Identifier(Solver[IdentificationResult]):
     def least(self, done: EvaluatedDesign) -> float | None:
         """Return the least RMS residual so far; see `Solver`."""
         if done.complete:
-            residual = root_mean_square(self.targets, done)
+            residual = root_mean_square(self.study.targets, done)
             self.residual = residual if self.residual is None else min(residual, self.residual)
         return self.residual
 
     def result(self, session: Session) -> IdentificationResult:
         """Return the design with the smallest residuals, with its metrics and those of the start."""
-        history, targets, start = session.evaluate.history, self.targets, session.start
+        history, targets, start = session.evaluate.history, self.study.targets, session.start
         best = self.best or closest(targets, history)
         return IdentificationResult(
             **of_session(session, best),

@@ -147,33 +147,33 @@ def _objective(table: ObjectiveTable, members: Members) -> Objective:
     return Objective(dict(table.minimise), table.over, table.relative, limits)
 
 
+@dataclass
 class _Optimiser(Solver[OptimisationResult]):
     """Minimisation of the objective, with the best of the designs reported so far."""
 
-    def __init__(self, study: OptimisationStudy) -> None:
-        self.study, self.objective = study, study.objective
-        self.best: EvaluatedDesign | None = None
-        self.scales: Mapping[str, float] | None = None
+    study: OptimisationStudy
+    best: EvaluatedDesign | None = None
+    scales: Mapping[str, float] | None = None
 
     def solve(self, evaluate: Evaluate) -> str:
         """Minimise the objective; see `Solver`."""
-        problem = DesignProblem(self.objective, evaluate)
-        start = sampled_start(evaluate, lambda designs: best_of(self.objective, problem.scales, designs))
+        problem = DesignProblem(self.study.objective, evaluate)
+        start = sampled_start(evaluate, lambda designs: best_of(self.study.objective, problem.scales, designs))
         return minimise(problem, self.study.search.method, self.study.unit(start.design))
 
     def least(self, done: EvaluatedDesign) -> float | None:
         """Return the objective of the best design so far; see `Solver`. The first design is the start."""
         if self.scales is None and done.complete:
-            self.scales = self.objective.scales(done)
+            self.scales = self.study.objective.scales(done)
         if self.scales is None or not all(self.scales.values()):
             return None
         compared = [done] if self.best is None else [self.best, done]
-        self.best = best_of(self.objective, self.scales, compared)
-        return None if self.best is None else self.objective.value(self.best, self.scales)
+        self.best = best_of(self.study.objective, self.scales, compared)
+        return None if self.best is None else self.study.objective.value(self.best, self.scales)
 
     def result(self, session: Session) -> OptimisationResult:
         """Return the best of all designs, with its metrics and those of the start."""
-        history, objective, start = session.evaluate.history, self.objective, session.start
+        history, objective, start = session.evaluate.history, self.study.objective, session.start
         scales = {} if start is None else objective.scales(start)
         best = None if start is None else best_of(objective, scales, history)
         return OptimisationResult(

@@ -38,10 +38,11 @@ Slopes = Callable[[EvaluatedDesign], Mapping[str, Array]]
 
 def slopes_of(evaluate: Evaluate) -> Slopes:
     """Return exact derivatives if the evaluator computes them, else finite differences."""
-    differing = Differences(evaluate)
+    differing = Differences(evaluate, evaluate.study.search.difference)
     return differing if evaluate.run_slopes is None else ExactSlopes(evaluate, differing)
 
 
+@dataclass
 class Differences:
     """Central differences with the step of the study, or with a step adapted to the noise of its metrics.
 
@@ -50,9 +51,8 @@ class Differences:
     the parameter (Press et al., Numerical Recipes, 5.7).
     """
 
-    def __init__(self, evaluate: Evaluate) -> None:
-        self.evaluate = evaluate
-        self.step = evaluate.study.search.difference
+    evaluate: Evaluate
+    step: float | None
 
     def __call__(self, at: EvaluatedDesign) -> Mapping[str, Array]:
         """Compute the derivatives; see `Slopes`."""
