@@ -296,11 +296,10 @@ def dataset_of(run: Runs, options: IntegrationOptions) -> xr.Dataset:
 
 def _compile(mechanism: Mechanism) -> None:
     """Compile the kernels if the parent process has not done so, once per process and geometry."""
-    if mechanism.geometry not in _compiled:
-        with _compiling:
-            if mechanism.geometry not in _compiled:
-                compile_kernels_for(mechanism, lambda _: None)
-                _compiled.add(mechanism.geometry)
+    with _compiling:
+        if mechanism.geometry not in _compiled:
+            compile_kernels_for(mechanism, lambda _: None)
+            _compiled.add(mechanism.geometry)
 
 
 _compiled: set[Geometry] = set()

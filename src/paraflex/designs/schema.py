@@ -103,11 +103,8 @@ def check_of_statics(given: Collection[str]) -> None:
     """
     for name in _OF_RUNS:
         if name in given:
-            raise InputError(
-                "equilibria have none: the study is of statics",
-                field=name,
-                remedy="leave it out, or the [statics] table",
-            )
+            remedy = "leave it out, or the [statics] table"
+            raise InputError("equilibria have none: the study is of statics", field=name, remedy=remedy)
 
 
 @contextmanager

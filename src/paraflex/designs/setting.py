@@ -158,10 +158,8 @@ class Setting:
     def parts(self) -> dict[str, PathPart]:
         """Return the covered part of each path that runs do not complete, for the design that the file describes."""
         model = model_from(dict(self.data), self.source)
-        found = {}
-        for name in self.paths if self.has_path else ():
-            path = model.path(name)
-            found[name] = part_of(path, model.duration(path, self.duration))
+        paths = {name: model.path(name) for name in (self.paths if self.has_path else ())}
+        found = {name: part_of(path, model.duration(path, self.duration)) for name, path in paths.items()}
         return {name: part for name, part in found.items() if part is not None}
 
     def verdict(self) -> Verdict:

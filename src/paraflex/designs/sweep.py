@@ -219,11 +219,10 @@ class SweepStudy(Study["SweepResult"]):
         account = study_account(self.name, setting, self.parameters, self.content(), runs=self.runs, sampling=self.kind)
         with open_campaign(folder, account, table_schema(setting, self.members), self._has) as campaign:
             session = _Session(self, campaign, on_progress)
-            interrupted = False
-            if not session.complete:
-                compile_kernels_for(self.model().mechanism)
-                interrupted = session.go((workers or Workers()).open(), partial(run, setting), limit)
-            return session.end(interrupted)
+            if session.complete:
+                return session.end(interrupted=False)
+            compile_kernels_for(self.model().mechanism)
+            return session.end(session.go((workers or Workers()).open(), partial(run, setting), limit))
 
     def _task(self, number: int) -> Task:
         design, path = divmod(number, len(self.setting.paths))

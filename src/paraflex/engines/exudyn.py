@@ -234,12 +234,9 @@ def _add_cable(engine: _Engine, beam: FlexibleBeam, pose: RigidState) -> Cable:
     mesh, of_span = beam.mesh, beam.spans
     spans = tuple(of_span[span] for span in mesh.spans)
     slope, turning = pose.direction(1.0, 0.0)
-    nodes, columns = [], []
-    for x in mesh.nodes.tolist():
-        position, velocity = pose.point(x, 0.0)
-        node, own = engine.node("NodePoint2DSlope1", [*position, *slope], [*velocity, *turning])
-        nodes.append(node)
-        columns.append(own)
+    ends = [pose.point(x, 0.0) for x in mesh.nodes.tolist()]
+    added = [engine.node("NodePoint2DSlope1", [*place, *slope], [*velocity, *turning]) for place, velocity in ends]
+    nodes, columns = map(list, zip(*added, strict=True))
     items = [
         engine.add(
             "ObjectANCFCable2D",

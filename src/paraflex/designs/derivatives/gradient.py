@@ -45,8 +45,6 @@ class ModeGradients:
         Gradients with respect to the parameters by column.
     errors : dict of str to (parameters,) array
         Estimated errors of `gradients` from difference formulas, applied to numbers of the file and to signals.
-    steps : int
-        Number of accepted steps.
     residual : float
         Largest relative last correction of the stage equations; see `RunDerivatives`.
     """
@@ -55,7 +53,6 @@ class ModeGradients:
     values: dict[str, float]
     gradients: dict[str, Array]
     errors: dict[str, Array]
-    steps: int
     residual: float
 
 
@@ -130,7 +127,6 @@ def _of_mode(setting: Setting, nominal: RunInputs, changes: Sequence[Change]) ->
         values=measure(run, setting.metrics),
         gradients=dict(zip(names, values, strict=True)),
         errors=dict(zip(names, errors, strict=True)),
-        steps=found.steps,
         residual=found.residual,
     )
 

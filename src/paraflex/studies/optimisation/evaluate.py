@@ -158,17 +158,18 @@ class Evaluate:
 
     def _compute(self, designs: list[Design], run: RunTask) -> Iterator[tuple[Design, tuple[Row, ...]]]:
         """Compute designs, and yield each with all its rows in order of completion."""
-        setting = self.study.setting
+        # Those of one design.
+        setting, runs = self.study.setting, self.study.base.runs
         rows: dict[Design, dict[tuple[str, str], Row]] = {design: {} for design in designs}
         for job, outcome in outcomes(self.engine, partial(_do, run), self._jobs(designs)):
             if isinstance(outcome, LostWorker):
                 outcome = lost(job.setting, job.task, str(outcome))
             design = job.task.values
             rows[design] |= {(row["path"], row["mode"]): row for row in outcome.rows}
-            if len(rows[design]) == self.study.runs:
+            if len(rows[design]) == runs:
                 ordered = [rows[design][path, mode] for path in setting.paths for mode in setting.modes]
                 number = self._numbers[design]
-                first = number * self.study.runs
+                first = number * runs
                 yield design, tuple(row | {"run": first + k, "design": number} for k, row in enumerate(ordered))
 
     def _jobs(self, designs: list[Design]) -> Iterator[Job]:

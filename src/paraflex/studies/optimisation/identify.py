@@ -45,7 +45,9 @@ class TargetResult:
 
     def to_dict(self) -> dict[str, Any]:
         """Return target, metric and residual as plain values."""
-        return self.target.to_dict() | {"reached": self.reached, "start": self.start, "residual": self.residual}
+        target = self.target
+        of_target = {"path": target.path, "mode": target.mode, "metric": target.column, "value": target.value}
+        return of_target | {"reached": self.reached, "start": self.start, "residual": self.residual}
 
 
 @dataclass(frozen=True, kw_only=True)

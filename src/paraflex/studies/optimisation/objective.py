@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -128,7 +127,3 @@ class Target:
     def slope(self, slopes: Mapping[str, Array]) -> Array:
         """Compute the derivatives of `residual` (parameters,) from those of the metrics (runs, parameters)."""
         return self.factor * slopes[self.column][self.run]
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return the target as plain values."""
-        return {"path": self.path, "mode": self.mode, "metric": self.column, "value": self.value}

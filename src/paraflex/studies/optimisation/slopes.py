@@ -109,7 +109,7 @@ def differences(evaluate: Evaluate, at: EvaluatedDesign, step: float) -> Mapping
     middle = study.unit(at.design)
     sides = np.clip(middle[:, None] + step * np.array([-1.0, 1.0]), 0.0, 1.0)
     done = evaluate([_moved(study, at, k, x) for k in range(middle.size) for x in sides[k]])
-    columns = {column: np.zeros((study.runs, middle.size)) for column in study.columns}
+    columns = {column: np.zeros((study.base.runs, middle.size)) for column in study.columns}
     for k in range(middle.size):
         usable = [each for each in (done[2 * k], at, done[2 * k + 1]) if each.complete]
         apart = study.unit(usable[-1].design)[k] - study.unit(usable[0].design)[k]
