@@ -143,8 +143,7 @@ class Evaluate:
 
     def _read(self, design: Design) -> bool:
         setting = self.study.setting
-        tasks = [Task(0, 0, design, path) for path in setting.paths]
-        ids = [run_id(setting, task, mode) for task in tasks for mode in setting.modes]
+        ids = [run_id(setting, Task(0, 0, design, path), mode) for path in setting.paths for mode in setting.modes]
         found = all(each in self._rows for each in ids)
         if found:
             self._keep(design, tuple(self._rows[each] for each in ids))

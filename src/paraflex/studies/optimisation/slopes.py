@@ -71,13 +71,21 @@ class ExactSlopes:
 
     def __call__(self, at: EvaluatedDesign) -> Mapping[str, Array]:
         """Compute the derivatives; see `Slopes`."""
-        if not _has_slopes(self.evaluate.study, at):
+        study = self.evaluate.study
+        names = {column: [slope_column(column, name) for name in study.setting.names] for column in study.columns}
+        needed = [name for each in names.values() for name in each]
+        if any(not row.get(NO_SLOPES) and any(row.get(name) is None for name in needed) for row in at.rows):
             at = self.evaluate.add_slopes(at)
         for row in at.rows:
             if row.get(NO_SLOPES):
                 self.reasons.append(f'mode "{row["mode"]}": {row[NO_SLOPES]}')
                 return self.otherwise(at)
-        return exact_slopes(self.evaluate.study, at)
+        # Scaled to unit-cube coordinates.
+        scale = study.per_unit(at.design)
+        return {
+            column: scale * np.array([[row[name] for name in each] for row in at.rows])
+            for column, each in names.items()
+        }
 
 
 def relative_noise(evaluate: Evaluate, at: EvaluatedDesign) -> float:
@@ -127,20 +135,6 @@ def _moved(study: DesignStudy[Result], at: EvaluatedDesign, k: int, place: float
     return (*at.design[:k], moved, *at.design[k + 1 :])
 
 
-def exact_slopes(study: DesignStudy[Result], at: EvaluatedDesign) -> Mapping[str, Array]:
-    """Return the exact derivatives stored in the rows, scaled to unit-cube coordinates; see `run_slopes`."""
-    scale = study.per_unit(at.design)
-    return {
-        column: scale * np.array([[row[slope_column(column, name)] for name in study.setting.names] for row in at.rows])
-        for column in study.columns
-    }
-
-
-def _has_slopes(study: DesignStudy[Result], at: EvaluatedDesign) -> bool:
-    columns = [slope_column(column, name) for column in study.columns for name in study.setting.names]
-    return all(row.get(NO_SLOPES) or all(row.get(each) is not None for each in columns) for row in at.rows)
-
-
 def no_exact_slopes(study: DesignStudy[Result]) -> str:
     """Return the reason why a study has no exact derivatives; empty if it has them."""
     from paraflex.designs.derivatives.plans import check_differentiable_study
@@ -172,13 +166,12 @@ def run_slopes(
     """
     from paraflex.designs.derivatives.gradient import metric_gradients
 
-    single = {mode: replace(setting, modes=(mode,)) for mode in setting.modes}
     chosen = [size if value == 0.0 else None for size, value in zip(sizes, task.values, strict=True)]
     rows: list[Row] = []
-    for mode, alone in single.items():
+    for mode in setting.modes:
         row: Row = {"path": task.path, "mode": mode, NO_SLOPES: None}
         try:
-            ((_, _, slopes),) = metric_gradients(alone, task, sizes=chosen)
+            ((_, _, slopes),) = metric_gradients(replace(setting, modes=(mode,)), task, sizes=chosen)
             for column in columns:
                 found = [float(x) for x in slopes[column]]
                 if not np.all(np.isfinite(found)):
@@ -204,8 +197,7 @@ def noise_of(values: Array) -> Array:
     values : (points, ...) array
         Values at the points; the noise of each component is estimated separately.
     """
-    columns = values.reshape(values.shape[0], -1)
-    return np.array([_noise(column) for column in columns.T]).reshape(values.shape[1:])
+    return np.apply_along_axis(_noise, 0, values)
 
 
 def _noise(values: Array) -> float:
