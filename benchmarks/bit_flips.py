@@ -39,11 +39,6 @@ from paraflex.designs.reopen import open_study
 from paraflex.errors import InputError
 from paraflex.plots.sources import open_source
 from paraflex.studies import (
-    ComparisonOptions,
-    ComparisonStudy,
-    TrackingStudy,
-    VerificationOptions,
-    VerificationStudy,
     load_identification,
     load_indices,
     load_optimisation,
@@ -51,6 +46,9 @@ from paraflex.studies import (
     load_sweep,
     tracking_case,
 )
+from paraflex.studies.compare import ComparisonOptions, ComparisonStudy
+from paraflex.studies.tracking import TrackingStudy
+from paraflex.studies.verification import VerificationOptions, VerificationStudy
 
 CASES, SEED = 3000, 20
 OUTCOMES = ("raw", "silent", "found", "harmless")

@@ -24,7 +24,9 @@ from paraflex.fem import ReferenceCondition
 from paraflex.files import Model
 from paraflex.integrators import IntegrationOptions
 from paraflex.mechanism import Curvature, FlexibleBeam, Geometry, JointFriction, Mechanism, PiecewiseProfile
-from paraflex.studies import Case, ComparisonOptions, compare_methods, motion_case, tracking_case
+from paraflex.studies import compare_methods, motion_case, tracking_case
+from paraflex.studies.cases import Case
+from paraflex.studies.compare import ComparisonOptions
 
 METHODS = ("tr-bdf2", "esdirk3", "esdirk4", "esdirk5")
 TOLERANCES = (1e-4, 1e-5, 1e-6)

@@ -208,7 +208,7 @@ def _run(case: Case, file: Path) -> str:
     import paraflex as pf
     from paraflex.campaign import Workers
     from paraflex.checks import check
-    from paraflex.studies import TrackingStudy
+    from paraflex.studies.tracking import TrackingStudy
 
     model = pf.load(file)
     study = model.study

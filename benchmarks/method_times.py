@@ -12,7 +12,8 @@ from common import command_line, single_thread, table, write_json
 import paraflex as pf
 from paraflex.compilation import compile_kernels
 from paraflex.integrators import METHODS
-from paraflex.studies import ComparisonOptions, compare_methods, tracking_case
+from paraflex.studies import compare_methods, tracking_case
+from paraflex.studies.compare import ComparisonOptions
 
 TOLERANCES = (1e-3, 5e-4, 3e-4, 1e-4, 3e-5, 1e-5)
 

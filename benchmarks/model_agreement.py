@@ -20,7 +20,9 @@ from models import LINEAR_PINNED, PAPER, SECOND_ORDER, SECOND_ORDER_CANTILEVER, 
 
 import paraflex as pf
 from paraflex.engines.exudyn import ExudynOptions, simulate_exudyn
-from paraflex.studies import Refinement, VerificationOptions, verify
+from paraflex.studies import verify
+from paraflex.studies.agreement import Refinement
+from paraflex.studies.verification import VerificationOptions
 from paraflex.tracking import TrackingTask
 
 MODES = ("+-+-", "-+-+", "+--+", "+++-", "++-+", "++++")

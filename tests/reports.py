@@ -17,7 +17,8 @@ from paraflex.kinematics import Polygon
 from paraflex.mechanism import raparm_i
 from paraflex.report import Page, render
 from paraflex.report.packing import MISSING
-from paraflex.studies import VerificationOptions, VerificationStudy, run_study
+from paraflex.studies import run_study
+from paraflex.studies.verification import VerificationOptions, VerificationStudy
 from paraflex.tracking import plan_tracking
 
 MODES = ("++++", "+-+-", "-+-+")

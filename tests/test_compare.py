@@ -14,16 +14,10 @@ from paraflex.dynamics import build_system, consistent_state
 from paraflex.errors import InputError, IntegrationError
 from paraflex.files import load
 from paraflex.integrators import METHODS, Solution
-from paraflex.studies import (
-    Case,
-    ComparisonOptions,
-    Measurement,
-    MethodComparison,
-    Reference,
-    compare_methods,
-    motion_case,
-    tracking_case,
-)
+from paraflex.studies import compare_methods, motion_case, tracking_case
+from paraflex.studies.cases import Case
+from paraflex.studies.compare import ComparisonOptions
+from paraflex.studies.comparison import Measurement, MethodComparison, Reference
 from paraflex.tracking import plan_tracking
 from shell import interrupted, paraflex
 from test_plots import stays_on_the_page

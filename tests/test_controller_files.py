@@ -23,7 +23,7 @@ from paraflex.plots.planned import figures_of
 from paraflex.plots.sources import open_source
 from paraflex.report.provenance import asked, command_line
 from paraflex.results.controllers import controllers_of
-from paraflex.studies import TrackingStudy
+from paraflex.studies.tracking import TrackingStudy
 from rotors import ROTOR, rotor
 from shell import paraflex
 from test_simulation import AT_20_MS, pd as pd_law

@@ -26,10 +26,10 @@ from paraflex.mechanism import (
 )
 from paraflex.plots.layout import column_width
 from paraflex.plots.themes import theme
-from paraflex.studies import Refinement, VerificationOptions
+from paraflex.studies.agreement import Refinement
 from paraflex.studies.optimisation.objective import Objective
 from paraflex.studies.optimisation.study import Search
-from paraflex.studies.verification import ModelRuns
+from paraflex.studies.verification import ModelRuns, VerificationOptions
 from paraflex.tracking import plan_tracking, simulate
 
 

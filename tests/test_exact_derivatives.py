@@ -189,7 +189,7 @@ def test_what_a_run_is_given(study, name):
     setting, k = study.setting, NAMES.index(name)
     task = Task(0, 0, nominal_values(setting), "line")
     planned, options = plan_task(setting, task)
-    nominal = run_inputs(planned, options, "++++")
+    nominal = run_inputs(planned, options, planned.torques("++++"))
     size = size_of(setting, task, k)
     found = Change(setting, task, planned, k, size).of_mode(nominal)
     systems, torques, times = [], [], nominal.torques.times

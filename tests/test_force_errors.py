@@ -8,7 +8,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import paraflex as pf
-from paraflex.designs.derivatives.plans import inputs_with_torques
+from paraflex.designs.derivatives.plans import run_inputs
 from paraflex.dynamics import constant_signals, pack_signals, profile_signal
 from paraflex.dynamics.inputs import inputs_of
 from paraflex.dynamics.joint_loads import drive_torques, joint_loads
@@ -461,7 +461,7 @@ def test_samples_within_short_steps_solve_the_equations_of_motion(tracking, chos
     """Curves between stages are up to 10 % of the largest force away from that with steps of 1 ms of esdirk5."""
     options = pf.IntegrationOptions(**chosen)
     run = pf.simulate(tracking, "++++", warning=False, options=options)
-    form = OdeForm(inputs_with_torques(tracking, options, run.torques).problem, options)
+    form = OdeForm(run_inputs(tracking, options, run.torques).problem, options)
     found = [form.solve(*state) for state in zip(run.solution.t, run.solution.q, run.solution.v, strict=True)]
     for exact, of_run in (
         (np.array([one.multipliers for one in found]), run.solution.multipliers),

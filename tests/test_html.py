@@ -22,22 +22,13 @@ from paraflex.plots.mechanism_html import freedoms, mechanism_html
 from paraflex.plots.svg import sketch
 from paraflex.results import tracking_dataset
 from paraflex.results.drawing import assembled_data
-from paraflex.studies import (
-    Measurement,
-    MethodComparison,
-    Reference,
-    Sensitivities,
-    load_optimisation,
-    load_sweep,
-    optimise,
-    run_study,
-    sweep,
-    verify,
-)
+from paraflex.studies import load_optimisation, load_sweep, optimise, run_study, sweep, verify
+from paraflex.studies.comparison import Measurement, MethodComparison, Reference
 from paraflex.studies.html import indices_html, search_html
 from paraflex.studies.optimisation.identify import IdentificationResult, TargetResult
 from paraflex.studies.optimisation.indices import IndicesResult
 from paraflex.studies.optimisation.objective import Target
+from paraflex.studies.sensitivities.study import Sensitivities
 
 _EMPTY = {"circle", "path", "rect", "br", "polygon", "polyline"}
 EVIL = '<script>alert("x")</script> & co'

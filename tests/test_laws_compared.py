@@ -20,8 +20,7 @@ from paraflex.control.laws.joints import internal_torques
 from paraflex.errors import InputError
 from paraflex.plots.style import BLUE, VERMILLION
 from paraflex.reduced_bodies import reduced_mechanism
-from paraflex.studies import LawStudy
-from paraflex.studies.laws import laws_of
+from paraflex.studies.laws import LawStudy, laws_of
 from shell import interrupted, paraflex
 
 LAWS = Path(__file__).parents[1] / "examples" / "laws.toml"

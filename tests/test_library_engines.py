@@ -5,8 +5,8 @@ import pytest
 
 from paraflex.files import load
 from paraflex.mechanism import Geometry
-from paraflex.studies import Refinement, VerificationOptions
-from paraflex.studies.verification import run_model
+from paraflex.studies.agreement import Refinement
+from paraflex.studies.verification import VerificationOptions, run_model
 from paraflex.tracking import plan_tracking
 
 OPTIONS = VerificationOptions(tolerance=5e-7)

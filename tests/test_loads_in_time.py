@@ -9,7 +9,7 @@ import paraflex as pf
 from paraflex.actuation import required_effort
 from paraflex.checks import check
 from paraflex.designs.derivatives.changes import Change
-from paraflex.designs.derivatives.plans import inputs_with_torques, nominal_values, run_inputs
+from paraflex.designs.derivatives.plans import nominal_values, run_inputs
 from paraflex.designs.run import Task, plan_task
 from paraflex.dynamics import acting_loads, balanced_state, build_system, consistent_state, inputs_of
 from paraflex.dynamics.signals import pack_signals, profile_signal
@@ -482,7 +482,7 @@ def test_runs_have_derivatives_by_a_number_in_a_profile_of_a_load(tmp_path, monk
     setting = study.setting
     task = Task(0, 0, nominal_values(study.setting), "line")
     planned, options = plan_task(setting, task)
-    nominal = run_inputs(planned, options, "++++")
+    nominal = run_inputs(planned, options, planned.torques("++++"))
     # Rigid links know their thickness by their mass alone.
     for k, step in enumerate([1e-2, 3e-4 if flexible else 3e-2]):
         change = Change(setting, task, planned, k, task.values[k]).of_mode(nominal)
@@ -494,7 +494,7 @@ def test_runs_have_derivatives_by_a_number_in_a_profile_of_a_load(tmp_path, monk
             values[k] *= 1.0 + place * step
             beside, _ = plan_task(setting, task._replace(values=tuple(values)))
             beside = replace(beside, system=build_system(beside.mechanism, like=planned.system))
-            near = inputs_with_torques(beside, options, feed_forward_like(beside.plan, nominal.torques))
+            near = run_inputs(beside, options, feed_forward_like(beside.plan, nominal.torques))
             motions.append(run_derivatives(near.problem, options, []).motion)
         for kind, exact, parts in zip(found.motion._fields, found.derivatives, zip(*motions, strict=True), strict=True):
             expected = sum(weight * part for (_, weight), part in zip(PLACES, parts, strict=True)) / step
@@ -515,7 +515,7 @@ def test_loads_with_pieces_have_no_derivative_along_a_path(tmp_path, force):
     task = Task(0, 0, nominal_values(study.setting), "line")
     planned, options = plan_task(study.setting, task)
     with pytest.raises(InputError, match="loads whose profile has pieces or a linear table: no derivative"):
-        Change(study.setting, task, planned, 0, 5.0).of_mode(run_inputs(planned, options, "++++"))
+        Change(study.setting, task, planned, 0, 5.0).of_mode(run_inputs(planned, options, planned.torques("++++")))
 
 
 def test_an_arm_in_one_revolute_joint_is_what_the_file_says(tmp_path):

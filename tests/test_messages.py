@@ -32,7 +32,8 @@ from paraflex.mechanism import (
 )
 from paraflex.motion import simulate_motion
 from paraflex.results import open_results
-from paraflex.studies import ComparisonOptions, load_optimisation, load_sensitivities, load_sweep, sensitivities, sweep
+from paraflex.studies import load_optimisation, load_sensitivities, load_sweep, sensitivities, sweep
+from paraflex.studies.compare import ComparisonOptions
 from paraflex.tracking import plan_tracking
 from paraflex.validity import likely_cause
 from test_bad_input import broken

@@ -26,7 +26,7 @@ from paraflex.plots import convergence
 from paraflex.studies import load_optimisation, optimise
 from paraflex.studies.optimisation.evaluate import Evaluate
 from paraflex.studies.optimisation.problem import DesignProblem
-from paraflex.studies.optimisation.slopes import differences, slopes_of
+from paraflex.studies.optimisation.slopes import differences
 from processes import started
 from shell import paraflex
 
@@ -166,7 +166,7 @@ def test_where_nothing_runs_the_slope_leads_back(tmp_path, evaluate_of):
 
     study = study_of(tmp_path, OBJECTIVE)
     evaluate = evaluate_of(study, tmp_path / "out", made_up(tracking_rms=slope))
-    problem = DesignProblem(study, study.objective, evaluate, slopes_of(study, evaluate))
+    problem = DesignProblem(study.objective, evaluate)
     problem.slope(problem.start)
     x, step = np.array([0.1, 0.7]), np.diag([1e-4, 1e-4])
     rise = [(problem.value(x + h) - problem.value(x - h)) / 2e-4 for h in step]
@@ -213,11 +213,11 @@ def test_differences_are_slopes_of_the_unit_cube(tmp_path, evaluate_of):
     (at,) = evaluate([study.start])
     x, y = study.start
     exact = [2.0 * (x - 0.004) / 0.006, 0.6 * np.log10(y / 0.3)]  # y goes over one decade
-    assert differences(study, evaluate, at, 1e-3)["tracking_rms"] == pytest.approx(np.array([exact]), rel=1e-6)
+    assert differences(evaluate, at, 1e-3)["tracking_rms"] == pytest.approx(np.array([exact]), rel=1e-6)
     # At a bound they are one-sided, and no design is outside.
     (corner,) = evaluate([(0.002, 1.0)])
     exact = [2.0 * (0.002 - 0.004) / 0.006, 0.6 * np.log10(1.0 / 0.3)]
-    assert differences(study, evaluate, corner, 1e-3)["tracking_rms"] == pytest.approx(np.array([exact]), rel=3e-3)
+    assert differences(evaluate, corner, 1e-3)["tracking_rms"] == pytest.approx(np.array([exact]), rel=3e-3)
     designs = np.array(evaluate.run.designs)
     assert (designs.min(axis=0) >= [0.002, 0.1]).all()
     assert (designs.max(axis=0) <= [0.008, 1.0]).all()

@@ -12,7 +12,7 @@ import twins
 from paraflex.cli.commands.studies import SensitivityRequest
 from paraflex.cli.sensitivity import sensitivity_command
 from paraflex.designs.derivatives.changes import Change
-from paraflex.designs.derivatives.plans import inputs_with_torques, nominal_values, run_inputs, size_of
+from paraflex.designs.derivatives.plans import nominal_values, run_inputs, size_of
 from paraflex.designs.derivatives.stencil import STENCILS
 from paraflex.designs.measure import SMOOTH, metric_values
 from paraflex.designs.run import Task, plan_task, run_task
@@ -89,7 +89,7 @@ class Design:
         self.setting = study.setting
         self.task = Task(0, 0, nominal_values(study.setting), study.setting.paths[0])
         self.planned, self.options = plan_task(self.setting, self.task)
-        self.given = run_inputs(self.planned, self.options, study.setting.modes[0])
+        self.given = run_inputs(self.planned, self.options, self.planned.torques(study.setting.modes[0]))
 
     def direction(self, k):
         size = size_of(self.setting, self.task, k)
@@ -104,7 +104,7 @@ class Design:
             values[k] *= 1.0 + place * step
             planned, options = plan_task(self.setting, self.task._replace(values=tuple(values)))
             planned = replace(planned, system=build_system(planned.mechanism, like=self.planned.system))
-            near = inputs_with_torques(planned, options, twins.feed_forward_like(planned.plan, self.given.torques))
+            near = run_inputs(planned, options, twins.feed_forward_like(planned.plan, self.given.torques))
             motions.append(run_derivatives(near.problem, options, []).motion)
         return [
             sum(weight * part for (_, weight), part in zip(PLACES, parts, strict=True)) / step

@@ -16,12 +16,6 @@ from paraflex.campaign import Progress, Result, Study, Workers
 from paraflex.control import ControllerDescription
 from paraflex.errors import InputError
 from paraflex.studies import (
-    ComparisonOptions,
-    ComparisonStudy,
-    LawStudy,
-    TrackingStudy,
-    VerificationOptions,
-    VerificationStudy,
     load_identification,
     load_indices,
     load_optimisation,
@@ -29,6 +23,10 @@ from paraflex.studies import (
     load_sweep,
     tracking_case,
 )
+from paraflex.studies.compare import ComparisonOptions, ComparisonStudy
+from paraflex.studies.laws import LawStudy
+from paraflex.studies.tracking import TrackingStudy
+from paraflex.studies.verification import VerificationOptions, VerificationStudy
 from paraflex.writing import read_json
 
 LOOSE = pf.IntegrationOptions(tolerance=1e-3)

@@ -13,14 +13,9 @@ from paraflex.integrators import IntegrationOptions
 from paraflex.kinematics import Line
 from paraflex.mechanism import proportional_segments, raparm_i
 from paraflex.results import load_results, save_results, tracking_dataset
-from paraflex.studies import (
-    FIDELITIES,
-    Refinement,
-    VerificationOptions,
-    check_model,
-    reference_model,
-    verify,
-)
+from paraflex.studies import verify
+from paraflex.studies.agreement import Refinement, reference_model
+from paraflex.studies.verification import FIDELITIES, VerificationOptions, check_model
 from paraflex.tracking import plan_tracking
 
 MODELS = (*FIDELITIES, "exudyn", "mujoco")

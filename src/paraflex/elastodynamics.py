@@ -296,8 +296,6 @@ def _fields(task: TrackingTask, torques: FeedForward, t: Array, kept: list[Respo
         "kinetic_energy": energy[:, 0],
         "strain_energy": energy[:, 1],
         "work": np.full(t.size, np.nan),
-        "rejected": 0,
-        "newton_iterations": 0,
         "constraint_position_max": float(position),
         "constraint_velocity_max": float(velocity),
         "energy_balance_max": math.nan,

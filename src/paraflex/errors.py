@@ -103,6 +103,15 @@ def renamed(field: str, *, only: str = "") -> Iterator[None]:
         raise (error.at(field) if only in ("", error.field) else error) from None
 
 
+@contextmanager
+def optional_package(problem: str, *, field: str, value: object = None, remedy: str) -> Iterator[None]:
+    """Provide a context for the import of a package that may be missing, which is then an `InputError`."""
+    try:
+        yield
+    except ImportError:
+        raise InputError(problem, field=field, value=value, remedy=remedy) from None
+
+
 class OutputError(InputError):
     """A file or folder to which results cannot be written."""
 

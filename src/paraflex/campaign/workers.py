@@ -24,7 +24,7 @@ from importlib import import_module
 from itertools import islice
 from typing import Any, TypeVar
 
-from paraflex.errors import InputError, ParaflexError, suggestion
+from paraflex.errors import InputError, ParaflexError, optional_package, suggestion
 from paraflex.interrupts import Calls, end_with_parent, starting_processes, uninterrupted
 
 THREADS = "threads"
@@ -155,11 +155,9 @@ class Dask(Engine):
 
     def __init__(self, workers: int, address: str | None) -> None:
         super().__init__(1)
-        try:
+        remedy = "pip install 'paraflex[cluster]'"
+        with optional_package("Dask is not installed", field="--engine", value=DASK, remedy=remedy):
             distributed: Any = import_module("distributed")
-        except ImportError:
-            remedy = "pip install 'paraflex[cluster]'"
-            raise InputError("Dask is not installed", field="--engine", value=DASK, remedy=remedy) from None
         self._cluster = None
         if address is None:
             # Only this process has the TLS keys, and no dashboard port is open.

@@ -43,7 +43,7 @@ from paraflex.integrators import IntegrationOptions
 from paraflex.kinematics import Path
 from paraflex.mechanism import ActuationMode, Geometry, Mechanism, proportional_segments
 from paraflex.results.findings import keep_findings, verdict_of
-from paraflex.studies import Simulator, StudyResult, TrackingStudy
+from paraflex.studies.tracking import Simulator, StudyResult, TrackingStudy
 from paraflex.tracking import TrackingRun, TrackingTask, simulate
 
 

@@ -22,7 +22,9 @@ from paraflex.folders import COMPARISON, ResultsFolder
 from paraflex.integrators import METHODS
 from paraflex.integrators.methods import find_method
 from paraflex.mechanism import standing
-from paraflex.studies import Case, ComparisonOptions, ComparisonStudy, motion_case, tracking_case
+from paraflex.studies import motion_case, tracking_case
+from paraflex.studies.cases import Case
+from paraflex.studies.compare import ComparisonOptions, ComparisonStudy
 
 
 def compare_methods_command(request: CompareMethodsRequest) -> int:

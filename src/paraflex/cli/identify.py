@@ -7,7 +7,8 @@ from rich.console import Console
 from paraflex.cli.commands.studies import SearchRequest
 from paraflex.cli.search import search_command
 from paraflex.formatting import number
-from paraflex.studies import IdentificationResult, load_identification
+from paraflex.studies import load_identification
+from paraflex.studies.optimisation.identify import IdentificationResult
 
 
 def identify_command(request: SearchRequest) -> int:

@@ -14,7 +14,8 @@ from paraflex.cli.tables import plain_console, print_table
 from paraflex.compilation import compile_kernels_for
 from paraflex.figures.search import index_table
 from paraflex.plots import save_figures
-from paraflex.studies import IndicesResult, load_indices
+from paraflex.studies import load_indices
+from paraflex.studies.optimisation.indices import IndicesResult
 
 
 def indices_command(request: IndicesRequest) -> int:

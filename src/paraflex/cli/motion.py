@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict, replace
 from typing import Any
 
@@ -24,7 +24,8 @@ from paraflex.cli.request import acting_controllers, command_provenance, control
 from paraflex.cli.tables import controllers, loads, plain_console, reduction, validity
 from paraflex.cli.writing import write_drawn_run, write_numbers
 from paraflex.compilation import compile_kernels_for
-from paraflex.control import ControllerDescription, simulate_controlled_motion
+from paraflex.control import ControllerDescription
+from paraflex.designs.own_motion import own_run
 from paraflex.dynamics import State, build_system, standing_system
 from paraflex.dynamics.state import nearest_state
 from paraflex.errors import ControllerError, InputError, IntegrationError, ResultWarning, ValidityWarning, renamed
@@ -34,7 +35,7 @@ from paraflex.folders import RUN, ResultsFolder
 from paraflex.formatting import number
 from paraflex.integrators import IntegrationOptions
 from paraflex.mechanism import Mechanism
-from paraflex.motion import MotionRun, simulate_motion, state_at
+from paraflex.motion import MotionRun, state_at
 from paraflex.reduced_bodies import size_of
 from paraflex.results import motion_dataset, motion_summary
 from paraflex.results.reduced_runs import compared_with_full
@@ -121,23 +122,6 @@ def _run_held(
     return exit_code(finished, interrupted=run.solution.status == "interrupted")
 
 
-def free_run(
-    model: Model,
-    mechanism: Mechanism,
-    options: IntegrationOptions,
-    controllers: Sequence[ControllerDescription],
-    start: State | str | None,
-    on_progress: Callable[[float], None] | None = None,
-) -> MotionRun:
-    """Run a mechanism without a path as set in the model's study, under controllers or the given torques."""
-    study = model.study
-    assert study.duration is not None
-    how: dict[str, Any] = {"samples": study.samples, "start": start, "options": options, "on_progress": on_progress}
-    if controllers:
-        return simulate_controlled_motion(mechanism, study.duration, controllers, **how)
-    return simulate_motion(mechanism, study.duration, torques=study.torques, **how)
-
-
 def _simulate(
     console: Console,
     model: Model,
@@ -161,7 +145,7 @@ def _simulate(
             # The table and the summary report these findings.
             warnings.simplefilter("ignore", ValidityWarning)
             warnings.simplefilter("ignore", ResultWarning)
-            return free_run(model, mechanism, options, controllers, begun, report)
+            return own_run(mechanism, study, controllers, start=begun, options=options, on_progress=report)
     except (IntegrationError, ControllerError) as error:
         return error.partial
 

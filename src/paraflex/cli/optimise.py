@@ -8,7 +8,8 @@ from paraflex.cli.commands.studies import SearchRequest
 from paraflex.cli.search import search_command
 from paraflex.figures.designs import column_label
 from paraflex.formatting import common_unit, quantity
-from paraflex.studies import OptimisationResult, load_optimisation
+from paraflex.studies import load_optimisation
+from paraflex.studies.optimisation.optimise import OptimisationResult
 
 
 def optimise_command(request: SearchRequest) -> int:

@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import shlex
 from collections.abc import Iterator, Sequence
-from dataclasses import replace
 from functools import partial
 
 import xarray as xr
@@ -15,11 +14,12 @@ from paraflex.cli.along import own_method, requested_tasks
 from paraflex.cli.commands.requests import filled, with_options
 from paraflex.cli.commands.runs import RunRequest
 from paraflex.cli.integration import integration_options
-from paraflex.cli.motion import free_run, own_motion, start_of
+from paraflex.cli.motion import own_motion, start_of
 from paraflex.cli.request import acting_controllers, find_path, requested_model
 from paraflex.cli.run import requested_mechanism
 from paraflex.cli.tables import plain_console
 from paraflex.compilation import compile_kernels_for
+from paraflex.designs.own_motion import own_run
 from paraflex.errors import InputError
 from paraflex.files import Model
 from paraflex.mechanism import parse_mode
@@ -92,7 +92,7 @@ def _runs(
     if path is None:
         study = own_motion(model, request.plan)
         start = start_of(model, mechanism, study.assembly, balanced=request.balanced) or study.assembly
-        yield free_run(replace(model, study=study), mechanism, options, controllers, start)
+        yield own_run(mechanism, study, controllers, warning=True, start=start, options=options)
         return
     chosen = [parse_mode(mechanism, mode) for mode in modes]
     task, _ = requested_tasks(request, model, mechanism, find_path(model, path), chosen)

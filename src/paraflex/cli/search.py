@@ -18,7 +18,9 @@ from paraflex.compilation import compile_kernels_for
 from paraflex.figures.search import tables
 from paraflex.formatting import number, quantity
 from paraflex.plots import save_figures
-from paraflex.studies import DesignStudy, IdentificationResult, OptimisationResult
+from paraflex.studies.optimisation.identify import IdentificationResult
+from paraflex.studies.optimisation.optimise import OptimisationResult
+from paraflex.studies.optimisation.study import DesignStudy
 
 R = TypeVar("R", OptimisationResult, IdentificationResult)
 Report = Callable[[Console, R], None]

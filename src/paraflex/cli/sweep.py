@@ -14,9 +14,9 @@ from paraflex.cli.ending import exit_code, print_results
 from paraflex.cli.tables import plain_console
 from paraflex.compilation import compile_kernels_for
 from paraflex.designs.measure import beyond_limits, coarse_runs
-from paraflex.designs.sweep import SweepStudy
+from paraflex.designs.sweep import SweepResult, SweepStudy
 from paraflex.formatting import number, quantity
-from paraflex.studies import SweepResult, load_sweep
+from paraflex.studies import load_sweep
 
 
 def sweep_command(request: SweepRequest) -> int:

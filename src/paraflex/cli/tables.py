@@ -19,7 +19,7 @@ from paraflex.formatting import number as text_of, quantity
 if TYPE_CHECKING:
     # Their import takes as long as all of `paraflex info`.
     from paraflex.figures.tables import Table as DescribedTable
-    from paraflex.studies import StudyResult
+    from paraflex.studies.tracking import StudyResult
     from paraflex.tracking import TrackingTask
 
 

@@ -32,7 +32,7 @@ from paraflex.folders import VERIFICATION, ResultsFolder
 from paraflex.kinematics import Path
 from paraflex.mechanism import ActuationMode, Geometry
 from paraflex.results.following import SPAN_WORDS, ErrorSpan
-from paraflex.studies import FIDELITIES, VerificationOptions, VerificationStudy, check_model
+from paraflex.studies.verification import FIDELITIES, VerificationOptions, VerificationStudy, check_model
 
 
 def verify_command(request: VerifyRequest) -> int:

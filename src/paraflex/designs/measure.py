@@ -72,7 +72,6 @@ def check_metric(column: str, field: str = "metrics", known: Sequence[str] = tup
     name = metric_name(column)
     if name not in METRICS:
         raise InputError("unknown metric", field=field, value=column, remedy=suggestion(name, list(known)))
-    metric_of(column)
 
 
 def members_of(mechanism: Mechanism, given: Conditions | None = None) -> Members:

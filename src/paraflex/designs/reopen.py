@@ -129,7 +129,7 @@ def rerun(
         The run was abandoned by `watch`.
     """
     planned, options = ready(setting, Task(0, 0, tuple(values), path))
-    run = run_mode(planned, mode, options, watch)
+    run = run_mode(planned, mode, watch)
     return dataset_of(run, options), measure(run, setting.metrics)
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import threading
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from typing import TYPE_CHECKING, NamedTuple
 
 import xarray as xr
@@ -13,15 +14,15 @@ from paraflex.campaign import Row
 from paraflex.compilation import compile_kernels_for
 from paraflex.control import ControllerDescription, simulate_controlled
 from paraflex.designs.measure import Runs, coarseness, measure
-from paraflex.designs.own_motion import OwnMotion, own_motion
-from paraflex.designs.own_statics import OwnStatics
+from paraflex.designs.own_motion import own_run
 from paraflex.designs.setting import Setting, digest, versions
-from paraflex.equilibria.result import Statics
+from paraflex.dynamics import build_system
+from paraflex.equilibria import Statics, statics
 from paraflex.errors import InputError, NumericalError
 from paraflex.files import Model
 from paraflex.integrators import IntegrationOptions
 from paraflex.mechanism import Geometry, Mechanism
-from paraflex.motion import MotionRun
+from paraflex.motion import MotionRun, state_at
 from paraflex.reduced_bodies import reduced_mechanism
 from paraflex.results import motion_dataset, statics_dataset, tracking_dataset
 from paraflex.results.metrics import METRICS, Members
@@ -35,20 +36,19 @@ STATUSES = (STATUS_COMPLETE, STATUS_FAILED, STATUS_INVALID)
 _ID_DIGITS = 16
 
 
-class ControlledTask(NamedTuple):
-    """Planned motion, and the controllers that act in addition to its torques."""
-
-    task: TrackingTask
-    controllers: tuple[ControllerDescription, ...]
-
-
-# Inputs ready for `run_mode`.
-Planned = TrackingTask | ControlledTask | OwnMotion | OwnStatics
+# Function that is called with the time reached in a run [s]; a KeyboardInterrupt from it abandons the run.
+Watch = Callable[[float], None]
+# Function that runs a prepared design in an actuation mode, which is ignored without a path.
+Planned = Callable[[str, Watch | None], Runs]
 
 
-def under_control(task: TrackingTask, controllers: Sequence[ControllerDescription]) -> TrackingTask | ControlledTask:
-    """Combine a planned motion with controllers; return the motion itself if there are none."""
-    return ControlledTask(task, tuple(controllers)) if controllers else task
+def along_path(
+    task: TrackingTask, controllers: Sequence[ControllerDescription], options: IntegrationOptions
+) -> Planned:
+    """Return the function that runs a planned motion, with controllers in addition to its torques if there are any."""
+    if controllers:
+        return lambda mode, watch: simulate_controlled(task, mode, controllers, options=options, on_progress=watch)
+    return lambda mode, watch: simulate(task, mode, options=options, on_progress=watch, warning=False)
 
 
 class Task(NamedTuple):
@@ -79,11 +79,15 @@ class Outcome:
     trajectories: Mapping[str, xr.Dataset] = field(default_factory=dict)
 
 
+# `run_task`, or a function in its place: of the setting, a task and, in threads, a `Watch`.
+RunTask = Callable[..., Outcome]
+
+
 class Abandoned(Exception):
     """A run that was stopped on request and whose results are discarded."""
 
 
-def run_task(setting: Setting, task: Task, watch: Callable[[float], None] | None = None) -> Outcome:
+def run_task(setting: Setting, task: Task, watch: Watch | None = None) -> Outcome:
     """Plan a design's motion along a path and simulate it in every mode.
 
     The rows depend only on setting and task. An error of the design is reported in its rows and not raised.
@@ -118,7 +122,7 @@ def run_task(setting: Setting, task: Task, watch: Callable[[float], None] | None
             row |= error_row(error)
         return Outcome(task, rows)
     for row in rows:
-        measured, run = measured_mode(planned, row["mode"], options, setting.metrics, watch)
+        measured, run = measured_mode(planned, row["mode"], setting.metrics, watch)
         row |= measured
         if run is not None and setting.trajectories:
             # Datasets of repeated runs must be equal, so the wall time is left out.
@@ -128,7 +132,7 @@ def run_task(setting: Setting, task: Task, watch: Callable[[float], None] | None
 
 
 def ready(setting: Setting, task: Task) -> tuple[Planned, IntegrationOptions]:
-    """Prepare a design: return its planned motion, its motion without a path or its statics, and integration options.
+    """Prepare a design: return the function that runs it or computes its equilibria, and the integration options.
 
     Raises
     ------
@@ -137,14 +141,19 @@ def ready(setting: Setting, task: Task) -> tuple[Planned, IntegrationOptions]:
     """
     model, options = setting.design(task.values)
     if setting.has_path:
-        return under_control(_planned(setting, model, task), model.acting()), options
+        return along_path(_planned(setting, model, task), model.acting(), options), options
     _compile(model.mechanism)
     if setting.statics:
-        return OwnStatics(
-            model, setting.assembly, setting.trajectories or "buckling_factor" in setting.metrics
-        ), options
-    motion = own_motion(model, setting.duration, setting.samples, setting.assembly, balanced=setting.balanced)
-    return motion, options
+        # By default the start is the model's own, else the assembly of its study.
+        own = None if model.start is not None else model.study.assembly
+        # Buckling factors take half of the time.
+        buckling = None if setting.trajectories or "buckling_factor" in setting.metrics else 0
+        solve = partial(statics, model, assembly=setting.assembly or own, buckling=buckling, warning=False)
+        return lambda _mode, _watch: solve(), options
+    study = setting.own_study(model)
+    start = state_at(build_system(model.mechanism), model.start, study.assembly, balanced=setting.balanced)
+    run = partial(own_run, model.mechanism, study, model.acting(), start=start, options=options)
+    return lambda _, watch: run(on_progress=watch), options
 
 
 def plan_task(setting: Setting, task: Task) -> tuple[TrackingTask, IntegrationOptions]:
@@ -235,33 +244,22 @@ def _blank(setting: Setting, task: Task, mode: str) -> Row:
     }
 
 
-def run_mode(planned: Planned, mode: str, options: IntegrationOptions, watch: Callable[[float], None] | None) -> Runs:
-    """Simulate a prepared design in an actuation mode, which is ignored without a path, or compute its equilibria.
+def run_mode(planned: Planned, mode: str, watch: Watch | None = None) -> Runs:
+    """Run a prepared design in an actuation mode, or compute its equilibria.
 
     Raises
     ------
     Abandoned
         The run was abandoned by `watch`; see `run_task`.
     """
-    if isinstance(planned, OwnStatics):
-        return planned.found()
-    if isinstance(planned, OwnMotion):
-        run = planned.simulate(options, watch)
-    elif isinstance(planned, ControlledTask):
-        run = simulate_controlled(planned.task, mode, planned.controllers, options=options, on_progress=watch)
-    else:
-        run = simulate(planned, mode, options=options, on_progress=watch, warning=False)
+    run = planned(mode, watch)
     if run.solution.status == "interrupted":
         raise Abandoned
     return run
 
 
 def measured_mode(
-    planned: Planned,
-    mode: str,
-    options: IntegrationOptions,
-    metrics: Sequence[str],
-    watch: Callable[[float], None] | None = None,
+    planned: Planned, mode: str, metrics: Sequence[str], watch: Watch | None = None
 ) -> tuple[Row, Runs | None]:
     """Run a mode, and return its metrics and status by column, and the run.
 
@@ -273,7 +271,7 @@ def measured_mode(
         The run was abandoned by `watch`; see `run_task`.
     """
     try:
-        run = run_mode(planned, mode, options, watch)
+        run = run_mode(planned, mode, watch)
         row = measure(run, metrics) | {
             "status": STATUS_COMPLETE,
             "reason": coarseness(run, metrics),
@@ -298,11 +296,10 @@ def dataset_of(run: Runs, options: IntegrationOptions) -> xr.Dataset:
 
 def _compile(mechanism: Mechanism) -> None:
     """Compile the kernels if the parent process has not done so, once per process and geometry."""
-    if mechanism.geometry not in _compiled:
-        with _compiling:
-            if mechanism.geometry not in _compiled:
-                compile_kernels_for(mechanism, lambda _: None)
-                _compiled.add(mechanism.geometry)
+    with _compiling:
+        if mechanism.geometry not in _compiled:
+            compile_kernels_for(mechanism, lambda _: None)
+            _compiled.add(mechanism.geometry)
 
 
 _compiled: set[Geometry] = set()

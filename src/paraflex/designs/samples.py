@@ -99,20 +99,13 @@ def check_varied(parameter: SweptParameter, kind: str) -> None:
         if getattr(parameter, side) is None:
             raise InputError("is missing", field=f"{where}.{side}", remedy="give low and high, or values")
     _check_range(parameter, where)
-    if kind == GRID and not (parameter.number is not None and parameter.number >= 1):
-        raise InputError(
-            "a grid needs the number of values in this range",
-            field=f"{where}.number",
-            value=parameter.number,
-            remedy="give number, or values",
-        )
-    if kind != GRID and parameter.number is not None:
-        raise InputError(
-            "only grids have a number of values for each parameter",
-            field=f"{where}.number",
-            value=parameter.number,
-            remedy="give number in [sampling]",
-        )
+    if kind == GRID and (parameter.number or 0) < 1:
+        problem, remedy = "a grid needs the number of values in this range", "give number, or values"
+    elif kind != GRID and parameter.number is not None:
+        problem, remedy = "only grids have a number of values for each parameter", "give number in [sampling]"
+    else:
+        return
+    raise InputError(problem, field=f"{where}.number", value=parameter.number, remedy=remedy)
 
 
 def designs(parameters: Sequence[SweptParameter], kind: str, number: int | None, seed: int) -> Array:

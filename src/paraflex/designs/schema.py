@@ -2,19 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any, ClassVar, Literal, TypeVar
 
 from pydantic import BaseModel, ConfigDict, Field
 
+from paraflex.errors import InputError
 from paraflex.files.read import naming, read_toml, validate
 from paraflex.files.schema import Count, Number, NumberOfFields, Text, Yes
 
 T = TypeVar("T", bound=BaseModel)
 # Name of a study whose file does not give one.
 DEFAULT_NAME = "sweep"
+# Fields of a study that apply to runs only.
+_OF_RUNS = ("paths", "modes", "duration", "samples", "balanced", "integration")
 
 
 class FileTable(BaseModel):
@@ -88,6 +91,20 @@ class SweepTable(FileTable):
     sampling: SamplingTable = SamplingTable()
     integration: IntegrationTable = IntegrationTable()
     vary: dict[str, VaryTable] = Field(default={}, description="a [vary.NAME] table for each parameter")
+
+
+def check_of_statics(given: Collection[str]) -> None:
+    """Check that a study of equilibria has no fields for runs, from the names of the fields given.
+
+    Raises
+    ------
+    InputError
+        A field applies to runs only; the error names it.
+    """
+    for name in _OF_RUNS:
+        if name in given:
+            remedy = "leave it out, or the [statics] table"
+            raise InputError("equilibria have none: the study is of statics", field=name, remedy=remedy)
 
 
 @contextmanager

@@ -13,13 +13,12 @@ from typing import Any
 
 from paraflex.designs.measure import metrics_of
 from paraflex.designs.own_motion import own_duration
-from paraflex.designs.own_statics import check_of_statics
 from paraflex.designs.samples import SweptParameter
-from paraflex.designs.schema import SweepTable, VaryTable
+from paraflex.designs.schema import SweepTable, VaryTable, check_of_statics
 from paraflex.designs.units import check_unit_of, unit_of
 from paraflex.equilibria.conditions import chosen_over
 from paraflex.errors import InputError, suggestion
-from paraflex.files import Model, library_names, model_from
+from paraflex.files import Model, StudyDefaults, library_names, model_from
 from paraflex.files.expressions import ExpressionError, evaluate
 from paraflex.files.generators import is_generated
 from paraflex.files.model import read_model
@@ -152,20 +151,22 @@ class Setting:
         model = model_from(overlaid(dict(self.data), inside), self.source, self.text)
         return model, self.options(model, chosen)
 
+    def own_study(self, model: Model) -> StudyDefaults:
+        """Return the study of a design without a path."""
+        return model.study.filled(duration=self.duration, samples=self.samples, assembly=self.assembly)
+
     def parts(self) -> dict[str, PathPart]:
         """Return the covered part of each path that runs do not complete, for the design that the file describes."""
         model = model_from(dict(self.data), self.source)
-        found = {}
-        for name in self.paths if self.has_path else ():
-            path = model.path(name)
-            found[name] = part_of(path, model.duration(path, self.duration))
+        paths = {name: model.path(name) for name in (self.paths if self.has_path else ())}
+        found = {name: part_of(path, model.duration(path, self.duration)) for name, path in paths.items()}
         return {name: part for name, part in found.items() if part is not None}
 
     def verdict(self) -> Verdict:
         """Return findings on the design that the file describes, and on paths that runs do not complete."""
         model = model_from(dict(self.data), self.source)
         parts = [part.finding(f"path.{name}") for name, part in self.parts().items()]
-        duration = None if self.has_path or self.statics else own_duration(model, self.duration)
+        duration = None if self.has_path or self.statics else own_duration(self.own_study(model))
         return Verdict([*implausible_numbers(model.mechanism, duration), *parts])
 
     def options(self, model: Model, chosen: Mapping[str, float] | None = None) -> IntegrationOptions:
@@ -206,7 +207,7 @@ def make_setting(table: SweepTable, folder: FilePath) -> tuple[Setting, tuple[Sw
         places=tuple(_places(data, parameter.name, parameter.fields) for parameter in parameters),
         whole=tuple(parameter.whole for parameter in parameters),
         paths=paths,
-        modes=_modes(model, table.modes) if paths != (NO_PATH,) else _no_modes(table),
+        modes=_modes(model, table.modes, paths),
         duration=table.duration,
         samples=table.samples,
         assembly=table.assembly,
@@ -317,17 +318,15 @@ def _paths(model: Model, names: list[str]) -> tuple[str, ...]:
     return tuple(dict.fromkeys(names))
 
 
-def _no_modes(table: SweepTable) -> tuple[str, ...]:
-    """Return the single empty mode name of runs without a path; raise an InputError if the study has modes."""
-    if table.modes:
-        raise InputError(
-            "a mechanism without a path has no actuation modes: its torques are given", field="modes",
-            value=table.modes[0], remedy="leave it out, or add a [path.NAME] table to the mechanism's file",
-        )  # fmt: skip
-    return (NO_MODE,)
-
-
-def _modes(model: Model, names: list[str]) -> tuple[str, ...]:
+def _modes(model: Model, names: list[str], paths: tuple[str, ...]) -> tuple[str, ...]:
+    """Return the names of the modes, a single empty one for runs without a path."""
+    if paths == (NO_PATH,):
+        if names:
+            raise InputError(
+                "a mechanism without a path has no actuation modes: its torques are given", field="modes",
+                value=names[0], remedy="leave it out, or add a [path.NAME] table to the mechanism's file",
+            )  # fmt: skip
+        return (NO_MODE,)
     try:
         modes = model.modes(names)
     except InputError as error:
@@ -355,7 +354,7 @@ def _check(setting: Setting, model: Model) -> None:
             "runs along a path start on the planned motion", field="balanced", value=True, remedy="leave it out"
         )
     if not (setting.has_path or setting.statics):
-        own_duration(model, setting.duration)
+        own_duration(setting.own_study(model))
         if model.study.reduced:
             raise InputError(
                 "few flexible coordinates are chosen from a planned path, and there is none",

@@ -34,7 +34,17 @@ from paraflex.campaign import (
 from paraflex.compilation import compile_kernels_for
 from paraflex.designs.measure import members_of
 from paraflex.designs.reopen import study_account
-from paraflex.designs.run import STATUS_COMPLETE, Outcome, Task, is_row_of, lost, run_id, run_task, table_schema
+from paraflex.designs.run import (
+    STATUS_COMPLETE,
+    Outcome,
+    RunTask,
+    Task,
+    is_row_of,
+    lost,
+    run_id,
+    run_task,
+    table_schema,
+)
 from paraflex.designs.samples import SweptParameter, check_varied, designs
 from paraflex.designs.schema import SweepTable, study_table
 from paraflex.designs.setting import Setting, make_setting
@@ -46,8 +56,6 @@ from paraflex.results.metrics import VALIDITY, Members
 from paraflex.results.storage import write_results
 from paraflex.results.tables import read_parquet
 from paraflex.writing import GO_ON, write_json
-
-RunTask = Callable[..., Outcome]
 
 
 @dataclass(frozen=True)
@@ -211,11 +219,10 @@ class SweepStudy(Study["SweepResult"]):
         account = study_account(self.name, setting, self.parameters, self.content(), runs=self.runs, sampling=self.kind)
         with open_campaign(folder, account, table_schema(setting, self.members), self._has) as campaign:
             session = _Session(self, campaign, on_progress)
-            interrupted = False
-            if not session.complete:
-                compile_kernels_for(self.model().mechanism)
-                interrupted = session.go((workers or Workers()).open(), partial(run, setting), limit)
-            return session.end(interrupted)
+            if session.complete:
+                return session.end(interrupted=False)
+            compile_kernels_for(self.model().mechanism)
+            return session.end(session.go((workers or Workers()).open(), partial(run, setting), limit))
 
     def _task(self, number: int) -> Task:
         design, path = divmod(number, len(self.setting.paths))

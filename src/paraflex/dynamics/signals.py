@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from itertools import pairwise
+from typing import NamedTuple
 
 import numpy as np
 
@@ -25,8 +25,7 @@ _SHORTEST_PIECE = 1e-6
 _DEGREE = 5
 
 
-@dataclass(frozen=True)
-class InputSignals:
+class InputSignals(NamedTuple):
     """A piecewise polynomial: breaks (k + 1,) and coefficients (k, 6), ascending powers of t - break."""
 
     breaks: Array

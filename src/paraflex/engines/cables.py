@@ -106,7 +106,7 @@ class RigidLink:
 
     Attributes
     ----------
-    item : int
+    items : (int,)
         Number of the object in the engine.
     columns : (3,) array of int
         Indices of the coordinates x, y and angle.
@@ -118,16 +118,18 @@ class RigidLink:
         Initial angle [rad].
     """
 
-    item: int
+    items: tuple[int]
     columns: Columns
     points: Mapping[str, Array]
     mass: float
     inertia: float
     start: float
+    # A cable has the positions and masses of its lumps.
+    lumped: ClassVar[tuple[tuple[dict[str, Any], float], ...]] = ()
 
     def place(self, point: str) -> dict[str, Any]:
         """Return the arguments of Exudyn for a marker at a named point."""
-        return {"bodyNumber": self.item, "localPosition": [*self.points[point], 0.0]}
+        return {"bodyNumber": self.items[0], "localPosition": [*self.points[point], 0.0]}
 
     def motion(self, point: str, history: Trajectory) -> PointMotion:
         """Return the motion of a named point."""
@@ -161,16 +163,6 @@ class RigidLink:
     def tip(self, history: Trajectory) -> Array:
         """Return zeros: a rigid body has no deflection."""
         return np.zeros((history.t.size, 3))
-
-    @property
-    def masses(self) -> tuple[int, ...]:
-        """Numbers of the engine's objects with distributed mass."""
-        return (self.item,)
-
-    @property
-    def lumped(self) -> list[tuple[dict[str, Any], float]]:
-        """Positions and masses of lumps; empty for a rigid body."""
-        return []
 
     def weighted(self, history: Trajectory) -> Array:
         """Return the first moment of mass, in the ground frame (k, 2) [kg m]."""
@@ -261,11 +253,6 @@ class Cable:
         return np.column_stack([c * x + s * y - self.mesh.length, c * y - s * x, slope])
 
     @property
-    def masses(self) -> tuple[int, ...]:
-        """Numbers of the engine's objects with distributed mass."""
-        return self.items
-
-    @property
     def lumped(self) -> list[tuple[dict[str, Any], float]]:
         """Positions and masses of the lumps."""
         return [(self._at(node), float(mass)) for node, (mass, _) in enumerate(self.lumps) if mass > 0.0]
@@ -273,13 +260,12 @@ class Cable:
     def weighted(self, history: Trajectory) -> Array:
         """Return the first moment of mass, in the ground frame (k, 2) [kg m]."""
         q = history.states[0][:, self.columns]
-        weights, rows = self._quadrature(_MASS_POINTS, 0)
-        return (weights * self._along("mass_per_length", _MASS_POINTS)) @ (rows @ q) + self.lumps[:, 0] @ q[:, ::2]
+        weights, rows = self._weights("mass_per_length", _MASS_POINTS), self._rows(_MASS_POINTS, 0)
+        return weights @ (rows @ q) + self.lumps[:, 0] @ q[:, ::2]
 
     def kinetic_energy(self, history: Trajectory) -> Array:
         """Compute 1/2 int rho A |r_t|^2 dx, plus 1/2 m |r_t|^2 + 1/2 J |r'_t|^2 of the lumps [J]."""
-        weights, rows = self._quadrature(_MASS_POINTS, 0)
-        weights = weights * self._along("mass_per_length", _MASS_POINTS)
+        weights, rows = self._weights("mass_per_length", _MASS_POINTS), self._rows(_MASS_POINTS, 0)
         mass = np.diag(self.lumps.ravel()) + (rows.T * weights) @ rows
         v = history.states[1][:, self.columns]
         return 0.5 * np.sum(v * (mass @ v), axis=(1, 2))
@@ -287,18 +273,16 @@ class Cable:
     def strain_energy(self, history: Trajectory) -> Array:
         """Compute 1/2 int EA (|r'| - 1)^2 + EI (r' x r'' / |r'|^2)^2 dx [J]."""
         q = history.states[0][:, self.columns]
-        weights, rows = self._quadrature(_AXIAL_POINTS, 1)
-        strain = np.linalg.norm(rows @ q, axis=2) - 1.0
-        axial = strain**2 @ (weights * self._along("axial_stiffness", _AXIAL_POINTS))
-        weights, rows = self._quadrature(_BENDING_POINTS, 1)
-        first, second = rows @ q, self._quadrature(_BENDING_POINTS, 2)[1] @ q
+        strain = np.linalg.norm(self._rows(_AXIAL_POINTS, 1) @ q, axis=2) - 1.0
+        axial = strain**2 @ self._weights("axial_stiffness", _AXIAL_POINTS)
+        first, second = (self._rows(_BENDING_POINTS, order) @ q for order in (1, 2))
         curvature = _cross(first, second) / np.sum(first**2, axis=2)
-        return 0.5 * (axial + curvature**2 @ (weights * self._along("bending_stiffness", _BENDING_POINTS)))
+        return 0.5 * (axial + curvature**2 @ self._weights("bending_stiffness", _BENDING_POINTS))
 
     def rounding(self, reference: Array) -> float:
         """Return the largest rounding error of the axial force, EA times that of positions over element length [N]."""
         far = float(np.max(np.abs(reference[self.columns[::2]])))
-        stiffest = float(np.max(self._along("axial_stiffness", 1) / np.diff(self.mesh.nodes)))
+        stiffest = float(np.max([span.axial_stiffness for span in self.spans] / np.diff(self.mesh.nodes)))
         return float(np.finfo(float).eps) * stiffest * far
 
     def _tangent(self, node: int, history: Trajectory) -> AngularMotion:
@@ -308,18 +292,19 @@ class Cable:
         """Return the vector from the first to the last end, with two derivatives (3, k, 2)."""
         return history.states[:, :, self.columns[-2]] - history.states[:, :, self.columns[0]]
 
-    def _along(self, quantity: str, count: int) -> Array:
-        """Return a property of the elements at their Gauss points."""
-        return np.repeat([getattr(span, quantity) for span in self.spans], count)
+    def _weights(self, quantity: str, count: int) -> Array:
+        """Return Gauss weights [m] along the beam times a property of its elements."""
+        weights = np.polynomial.legendre.leggauss(count)[1]
+        values = np.repeat([getattr(span, quantity) for span in self.spans], count)
+        return np.outer(0.5 * np.diff(self.mesh.nodes), weights).ravel() * values
 
-    def _quadrature(self, count: int, order: int) -> tuple[Array, Array]:
-        """Return Gauss weights [m] along the beam, and rows from r and r' at the nodes to a derivative of r."""
-        z, weights = np.polynomial.legendre.leggauss(count)
-        lengths = np.diff(self.mesh.nodes)
+    def _rows(self, count: int, order: int) -> Array:
+        """Return rows from r and r' at the nodes to a derivative of r at the Gauss points."""
+        z, lengths = np.polynomial.legendre.leggauss(count)[0], np.diff(self.mesh.nodes)
         rows = np.zeros((lengths.size, count, len(self.columns)))
         for element, length in enumerate(lengths):
             rows[element, :, 2 * element : 2 * element + 4] = _shape(0.5 * (z + 1.0), length, order)
-        return np.outer(0.5 * lengths, weights).ravel(), rows.reshape(-1, len(self.columns))
+        return rows.reshape(-1, len(self.columns))
 
 
 Link = RigidLink | Cable

@@ -10,7 +10,7 @@ import numpy as np
 
 from paraflex.arrays import Array
 from paraflex.engines.tree import spanning_tree
-from paraflex.errors import InputError
+from paraflex.errors import InputError, optional_package
 from paraflex.mechanism import FlexibleBeam, Mechanism, given_shapes, grouped, with_actuators
 from paraflex.tracking import TrackingTask
 
@@ -83,12 +83,9 @@ def import_engine(name: str) -> Any:
     InputError
         The engine is not installed.
     """
-    try:
+    remedy = "install it with pip install 'paraflex[engines]'"
+    with optional_package("not installed", field="engine", value=name, remedy=remedy):
         return import_module(name)
-    except ImportError:
-        raise InputError(
-            "not installed", field="engine", value=name, remedy="install it with pip install 'paraflex[engines]'"
-        ) from None
 
 
 def refuse(engine: str, what: str, field: str) -> NoReturn:

@@ -112,7 +112,9 @@ def simulate_exudyn(task: TrackingTask, mode: str | ActuationMode, options: Exud
     torques = task.torques(mode)
     substeps = steps_between(task.motion.t, options.step)
     begin = time.perf_counter()
-    engine = _start_engine()
+    exu, items = import_engine("exudyn"), import_engine("exudyn.itemInterface")
+    container = exu.SystemContainer()
+    engine = _Engine(exu, items, container, container.AddSystem())
     with _silent(engine.exu):
         model = _build(engine, with_rotors(task), options.refinement)
         history, figures = _run(engine, model, task, torques, substeps, options)
@@ -161,12 +163,6 @@ class _Engine:
         return [self.marker(linkage, ref) for ref in (joint.a, joint.b)]
 
 
-def _start_engine() -> _Engine:
-    exu, items = import_engine("exudyn"), import_engine("exudyn.itemInterface")
-    container = exu.SystemContainer()
-    return _Engine(exu, items, container, container.AddSystem())
-
-
 @contextmanager
 def _silent(exu: Any) -> Iterator[None]:
     """Suppress Exudyn's printed errors and warnings; failures are exceptions here."""
@@ -207,7 +203,7 @@ def _add_gravity(engine: _Engine, linkage: Linkage, mechanism: Mechanism) -> Non
         return
     field = [*mechanism.gravity, 0.0]
     for link in linkage.bodies.values():
-        for item in link.masses:
+        for item in link.items:
             marker = engine.mbs.AddMarker(engine.items.MarkerBodyMass(bodyNumber=item))
             engine.mbs.AddLoad(engine.items.LoadMassProportional(markerNumber=marker, loadVector=field))
         for place, mass in link.lumped:
@@ -217,8 +213,8 @@ def _add_gravity(engine: _Engine, linkage: Linkage, mechanism: Mechanism) -> Non
 
 
 def _add_body(engine: _Engine, task: TrackingTask, body: Body) -> Link:
-    first = task.system.body(body.name).offset
-    pose = RigidState(*(x for values in (task.start.q, task.start.v) for x in values[first : first + 3].tolist()))
+    frame = slice(first := task.system.body(body.name).offset, first + 3)
+    pose = RigidState(*task.start.q[frame].tolist(), *task.start.v[frame].tolist())
     if isinstance(body, FlexibleBeam) and body.flexible:
         return _add_cable(engine, body, pose)
     return _add_rigid(engine, task.system, body, pose)
@@ -232,19 +228,16 @@ def _add_rigid(engine: _Engine, system: System, body: Body, pose: RigidState) ->
     node, columns = engine.node("NodeRigidBody2D", [*position, pose.phi], [*velocity, pose.w])
     item = engine.add("ObjectRigidBody2D", mass=s.m, inertia=inertia, nodeNumber=node)
     points = {point: system.marker(PointRef(body.name, point)).x0 - centre for point in body.points}
-    return RigidLink(item, columns, points, s.m, inertia, pose.phi)
+    return RigidLink((item,), columns, points, s.m, inertia, pose.phi)
 
 
 def _add_cable(engine: _Engine, beam: FlexibleBeam, pose: RigidState) -> Cable:
     mesh, of_span = beam.mesh, beam.spans
     spans = tuple(of_span[span] for span in mesh.spans)
     slope, turning = pose.direction(1.0, 0.0)
-    nodes, columns = [], []
-    for x in mesh.nodes.tolist():
-        position, velocity = pose.point(x, 0.0)
-        node, own = engine.node("NodePoint2DSlope1", [*position, *slope], [*velocity, *turning])
-        nodes.append(node)
-        columns.append(own)
+    ends = [pose.point(x, 0.0) for x in mesh.nodes.tolist()]
+    added = [engine.node("NodePoint2DSlope1", [*place, *slope], [*velocity, *turning]) for place, velocity in ends]
+    nodes, columns = map(list, zip(*added, strict=True))
     items = [
         engine.add(
             "ObjectANCFCable2D",

@@ -265,8 +265,6 @@ def _solution(
         status="failed" if motion.failure else "complete",
         message=motion.failure,
         steps=count * (motion.samples - 1),
-        rejected=0,
-        newton_iterations=0,
         factorisations=4 * count * (motion.samples - 1),
         wall_time=wall_time,
         constraint_position_max=float(max((np.abs(phi).max(initial=0.0) for phi, _ in gaps), default=0.0)),

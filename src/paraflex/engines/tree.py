@@ -72,10 +72,14 @@ def spanning_tree(mechanism: Mechanism) -> Tree:
     InputError
         No joints connect a body with the ground.
     """
+    from scipy.cluster.hierarchy import DisjointSet
+
     held = {spring.joint for spring in mechanism.springs} | {name for one in mechanism.relations for name in one.joints}
     driven = {motor.joint for motor in mechanism.motors}
     ranked = sorted(mechanism.joints, key=lambda joint: (joint.name not in held, joint.name not in driven))
-    kept, closing = _split(ranked)
+    # Joints that connect separate parts are kept, in order; the others close loops (Kruskal).
+    parts = DisjointSet([GROUND, *(body.name for body in mechanism.bodies)])
+    kept = [joint for joint in ranked if parts.merge(joint.a.body, joint.b.body)]
     links: list[Link] = []
     hung, left = {GROUND}, [body.name for body in mechanism.bodies]
     while left:
@@ -94,27 +98,7 @@ def spanning_tree(mechanism: Mechanism) -> Tree:
     angles = {GROUND: np.zeros(len(links))}
     for i, link in enumerate(links):
         angles[link.name] = angles[link.parent] + np.eye(len(links))[i]
-    return Tree(tuple(links), tuple(closing), angles)
-
-
-def _split(joints: list[Joint]) -> tuple[list[Joint], list[Joint]]:
-    """Separate the joints that connect separate parts, in order, from those that close loops (Kruskal)."""
-    group: dict[str, str] = {}
-
-    def root(name: str) -> str:
-        while name in group:
-            name = group[name]
-        return name
-
-    kept, closing = [], []
-    for joint in joints:
-        a, b = root(joint.a.body), root(joint.b.body)
-        if a == b:
-            closing.append(joint)
-        else:
-            group[a] = b
-            kept.append(joint)
-    return kept, closing
+    return Tree(tuple(links), tuple(joint for joint in ranked if joint not in kept), angles)
 
 
 def joint_state(task: TrackingTask, tree: Tree) -> tuple[Array, Array]:

@@ -245,9 +245,7 @@ def resting_solution(
     return Solution(
         t=np.arange(len(q), dtype=float), q=q, v=np.zeros_like(q), a=np.zeros_like(q), multipliers=multipliers,
         kinetic_energy=zeros, strain_energy=strain_energy(system, q, multipliers), work=zeros, status=status,
-        message=message, steps=len(q), rejected=0, newton_iterations=0, factorisations=0, wall_time=0.0,
-        constraint_position_max=0.0, constraint_velocity_max=0.0, energy_balance_max=0.0, resting=True,
-        acting=acting,
+        message=message, steps=len(q), resting=True, acting=acting,
     )  # fmt: skip
 
 

@@ -81,13 +81,13 @@ class Solution:
     status: str
     message: str
     steps: int
-    rejected: int
-    newton_iterations: int
-    factorisations: int
-    wall_time: float
-    constraint_position_max: float
-    constraint_velocity_max: float
-    energy_balance_max: float
+    rejected: int = 0
+    newton_iterations: int = 0
+    factorisations: int = 0
+    wall_time: float = 0.0
+    constraint_position_max: float = 0.0
+    constraint_velocity_max: float = 0.0
+    energy_balance_max: float = 0.0
     singular_positions: tuple[float, ...] = ()
     method: str = ""
     evaluations: int = 0

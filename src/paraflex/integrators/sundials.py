@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from paraflex.arrays import Array
-from paraflex.errors import InputError
+from paraflex.errors import optional_package
 from paraflex.integrators.external_methods import ExternalMethod
 from paraflex.integrators.forms import DescriptorForm, OdeForm
 from paraflex.integrators.stepper import SolverCounts, Steps, attempts
@@ -34,15 +34,11 @@ def load_sundials() -> ModuleType:
     InputError
         The package is not installed.
     """
-    try:
-        package = import_module("sksundae")
+    problem, remedy = "needs SUNDIALS, which is not installed", "pip install 'paraflex[sundials]'"
+    with optional_package(problem, field="method", remedy=remedy):
         import_module("sksundae.cvode")
         import_module("sksundae.ida")
-    except ImportError as error:
-        raise InputError(
-            "needs SUNDIALS, which is not installed", field="method", remedy="pip install 'paraflex[sundials]'"
-        ) from error
-    return package
+        return import_module("sksundae")
 
 
 class SundialsStepper:

@@ -12,7 +12,7 @@ import scipy
 from numpy.typing import ArrayLike, NDArray
 
 from paraflex.arguments import numbers_in
-from paraflex.errors import InputError
+from paraflex.errors import InputError, optional_package
 from paraflex.linear.coordinates import Variable, named_axes
 from paraflex.mechanism.quantities import finite
 
@@ -35,13 +35,9 @@ class NamedModel:
         InputError
             python-control is not installed.
         """
-        try:
+        remedy = 'install it: pip install "paraflex[control]"'
+        with optional_package("python-control is not installed", field="to_control", remedy=remedy):
             control = importlib.import_module("control")
-        except ImportError:
-            raise InputError(
-                "python-control is not installed", field="to_control",
-                remedy='install it: pip install "paraflex[control]"',
-            ) from None  # fmt: skip
         plain = {key: [plain_name(one.name) for one in getattr(self, key)] for key in ("states", "inputs", "outputs")}
         return control.ss(*self.state_space, name=plain_name(self._attributes["mechanism"]), **plain)
 

@@ -78,13 +78,8 @@ def tracking_case(task: TrackingTask, mode: str | ActuationMode) -> Case:
     chosen, effector = task.mode(mode), task.mechanism.end_effector
     assert effector is not None
 
-    def solve(options: IntegrationOptions, on_progress: Progress | None) -> Solution:
-        run = partial(simulate, task, chosen, options=options, on_progress=on_progress)
-        return _solution(run)
-
-    times = task.motion.t
-    name = f"mode {chosen.name}"
-    return Case(name, task.system, float(times[-1] - times[0]), times.size, (effector.point,), solve)
+    times, solve = task.motion.t, partial(_solution, partial(simulate, task, chosen))
+    return Case(f"mode {chosen.name}", task.system, float(times[-1] - times[0]), times.size, (effector.point,), solve)
 
 
 @checked_arguments()
@@ -112,21 +107,17 @@ def motion_case(
     effector = mechanism.end_effector
     every = tuple(PointRef(body.name, point) for body in mechanism.bodies for point in body.points)
 
-    def solve(options: IntegrationOptions, on_progress: Progress | None) -> Solution:
-        run = partial(
-            simulate_motion, mechanism, duration, samples=samples, torques=torques, start=start,
-            options=options, on_progress=on_progress,
-        )  # fmt: skip
-        return _solution(run)
-
     points = every if effector is None else (effector.point,)
-    return Case("its own motion", build_system(mechanism), duration, samples, points, solve)
+    run = partial(simulate_motion, mechanism, duration, samples=samples, torques=torques, start=start)
+    return Case("its own motion", build_system(mechanism), duration, samples, points, partial(_solution, run))
 
 
-def _solution(run: Callable[[], TrackingRun | MotionRun]) -> Solution:
+def _solution(
+    run: Callable[..., TrackingRun | MotionRun], options: IntegrationOptions, on_progress: Progress | None
+) -> Solution:
     """Return the solution of a run; an IntegrationError is passed on with the partial solution."""
     try:
-        return run().solution
+        return run(options=options, on_progress=on_progress).solution
     except IntegrationError as error:
         error.partial = error.partial.solution
         raise

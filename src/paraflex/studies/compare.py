@@ -296,25 +296,20 @@ def _reference(case: Case, options: ComparisonOptions) -> tuple[Reference, Array
     Errors of other runs are distances from the first of them. Returns the reference and the positions of its points.
     """
     ours = sorted((x for x in METHODS.values() if x.family is Family.ESDIRK), key=lambda x: -x.order)
-    tolerance = options.tightest / _FINER
+    tolerance, patience = options.tightest / _FINER, _REFERENCE_PATIENCE * options.limit
     runs: list[tuple[Method, float, Solution]] = []
     reasons = []
     # If only one method succeeds, it is compared with itself at another tolerance.
     for method, times in [(x, y) for y in (1.0, 4.0) for x in ours]:
         finer = tolerance * (2.0 if runs and times == 1.0 else times)
         try:
-            solved = _solve(
-                case,
-                IntegrationOptions(method=method.name, tolerance=finer),
-                _REFERENCE_PATIENCE * options.limit,
-            )
+            solved = _solve(case, IntegrationOptions(method=method.name, tolerance=finer), patience)
         except _TooSlowError:
-            reasons.append(f"{method.title} takes longer than {_REFERENCE_PATIENCE * options.limit:g} s at {finer:g} m")
-            continue
+            reasons.append(f"{method.title} takes longer than {patience:g} s at {finer:g} m")
         except NumericalError as error:
             reasons.append(f"{method.title} at {finer:g} m: {error}")
-            continue
-        runs.append((method, finer, solved))
+        else:
+            runs.append((method, finer, solved))
         if len(runs) == 2:
             break
     if len(runs) < 2:

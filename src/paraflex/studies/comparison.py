@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import platform
+from contextlib import suppress
 from dataclasses import asdict, dataclass, fields
 from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
@@ -249,10 +250,8 @@ def machine() -> dict[str, Any]:
 
 
 def _versions() -> dict[str, str | None]:
-    out: dict[str, str | None] = {}
-    for package in _TIMING_PACKAGES:
-        try:
+    out: dict[str, str | None] = dict.fromkeys(_TIMING_PACKAGES)
+    for package in out:
+        with suppress(PackageNotFoundError):
             out[package] = version(package)
-        except PackageNotFoundError:
-            out[package] = None
     return out

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 from paraflex.designs.sweep import SweepResult
 from paraflex.display import described, facts, page, sentence, table
 from paraflex.figures import search, sensitivity
@@ -61,11 +59,10 @@ def study_html(result: StudyResult) -> str:
 @view.register(SweepResult)
 def sweep_html(result: SweepResult) -> str:
     """Return the number of runs by status and the path of the table as HTML."""
-    rate = f"{result.fresh} runs in {quantity(result.seconds, 's', padded=False)}" if result.fresh else None
     known = [
         ("runs", f"{result.done} of {result.total}"),
         *sorted(result.counts.items()),
-        ("in this session", rate),
+        ("in this session", _rate(result.fresh, "runs", result.seconds)),
         ("table", str(result.table)),
     ]
     return page(f"sweep: {_state(result.complete, result.interrupted)}", facts(known))
@@ -82,7 +79,16 @@ def search_html(result: SearchResult) -> str:
     return page(
         f"{result.kind}: {result.stopped}",
         *(described(table) for table in search.tables(found, result.units)),
-        facts([*ended, *_search_facts(result)]),
+        facts(
+            [
+                *ended,
+                ("designs", f"{result.evaluations}, {result.failed} of them not running"),
+                ("one that does not run", result.reasons[0] if result.reasons else None),
+                ("in this session", _rate(result.fresh, "designs", result.seconds)),
+                ("table", str(result.table)),
+                ("folder", str(result.folder)),
+            ]
+        ),
     )
 
 
@@ -138,17 +144,8 @@ def laws_html(comparison: LawComparison) -> str:
     return page(f"{found['mechanism']}, control laws compared: {state}", described(law_table(comparison.data)), *why)
 
 
-def _search_facts(result: SearchResult) -> list[tuple[str, Any]]:
-    return [
-        ("designs", f"{result.evaluations}, {result.failed} of them not running"),
-        ("one that does not run", result.reasons[0] if result.reasons else None),
-        (
-            "in this session",
-            f"{result.fresh} designs in {quantity(result.seconds, 's', padded=False)}" if result.fresh else None,
-        ),
-        ("table", str(result.table)),
-        ("folder", str(result.folder)),
-    ]
+def _rate(fresh: int, what: str, seconds: float) -> str | None:
+    return f"{fresh} {what} in {quantity(seconds, 's', padded=False)}" if fresh else None
 
 
 def _state(finished: bool, interrupted: bool) -> str:

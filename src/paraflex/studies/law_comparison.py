@@ -119,12 +119,11 @@ class LawComparison(Result):
         export(self.dataset, folder / CSV, "csv")
 
     def _of_law(self, row: xr.Dataset) -> dict[str, Any]:
-        cells = {mode: row.sel(mode=mode) for mode in self.modes}
         names = str(row["controllers"].item())
         return {
             "controllers": names.split(_TOGETHER) if names else [],
             "path": str(row["path"].item()),
-            "modes": {mode: _plain_cell(cell, self.metrics) for mode, cell in cells.items()},
+            "modes": {mode: _plain_cell(row.sel(mode=mode), self.metrics) for mode in self.modes},
         }
 
 

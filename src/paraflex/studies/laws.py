@@ -16,7 +16,7 @@ from paraflex.campaign import THREADS, LostWorker, OnProgress, Progress, Result,
 from paraflex.control.laws.described import NONE, ControllerDescription
 from paraflex.control.loop.chain import SampledController
 from paraflex.designs.measure import members_of, metrics_of
-from paraflex.designs.run import measured_mode, under_control
+from paraflex.designs.run import along_path, measured_mode
 from paraflex.errors import InputError
 from paraflex.files import Model, load
 from paraflex.integrators import IntegrationOptions
@@ -135,9 +135,9 @@ class LawStudy(WholeStudy[LawComparison], CheckedFields):
         name, mode = cell
         law, path = self.rows[name]
         # Controllers have internal states, and several modes are run at once.
-        planned = under_control(self.tasks[path], copy.deepcopy(tuple(self.laws[law])))
-        row, _ = measured_mode(planned, mode, self.options or IntegrationOptions(), self.metrics, watch)
-        return row
+        controllers = copy.deepcopy(tuple(self.laws[law]))
+        planned = along_path(self.tasks[path], controllers, self.options or IntegrationOptions())
+        return measured_mode(planned, mode, self.metrics, watch)[0]
 
     def _dataset(self, modes: Sequence[str], found: Mapping[Cell, Row]) -> Any:
         mechanism, options = self._task.mechanism, self.options or IntegrationOptions()

@@ -154,11 +154,9 @@ class TrackingStudy(WholeStudy[StudyResult], CheckedFields):
             whole: dict[str, Future[TrackingRun | str | None]] = {}
             calls = Calls()
             try:
-                for mode in chosen:
-                    futures[mode.name] = calls.submit(pool.submit, self._mode, self.task, mode, stop, on_progress)
-                if self.full is not None:
-                    for mode in chosen:
-                        whole[mode.name] = calls.submit(pool.submit, self._mode, self.full, mode, stop, None)
+                for task, into, watch in ((self.task, futures, on_progress), (self.full, whole, None)):
+                    for mode in chosen if task is not None else ():
+                        into[mode.name] = calls.submit(pool.submit, self._mode, task, mode, stop, watch)
                 left = {*futures.values(), *whole.values()}
                 while left:
                     left -= calls.done()

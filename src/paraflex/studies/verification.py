@@ -179,20 +179,17 @@ def run_model(
     half = 0.5 if finer else 1.0
     tolerance = IntegrationOptions(tolerance=options.tolerance * (0.25 if finer else 1.0), method=options.method)
     beams = task.mechanism.refined(denser)
-    if name == "rigid":
-        return record(simulate(task.remodelled(beams.rigid()), mode, options=tolerance, warning=False))
     if name == "ked":
         return record(simulate_ked(task.remodelled(beams), mode, step=half * options.ked_step))
-    if name in ("linear", "second-order"):
-        return record(
-            simulate(task.remodelled(beams.with_geometry(Geometry(name))), mode, options=tolerance, warning=False)
-        )
     if name == "exudyn":
         return simulate_exudyn(task, mode, ExudynOptions(step=half * options.exudyn_step, refinement=denser))
-    segments = task.in_segments(proportional_segments(task.mechanism, denser * options.segments))
-    if name == "segments":
-        return record(simulate(segments, mode, options=tolerance, warning=False))
-    return simulate_mujoco(segments, mode, MuJoCoOptions(step=half * options.mujoco_step))
+    if name in ("segments", "mujoco"):
+        variant = task.in_segments(proportional_segments(task.mechanism, denser * options.segments))
+    else:
+        variant = task.remodelled(beams.rigid() if name == "rigid" else beams.with_geometry(Geometry(name)))
+    if name == "mujoco":
+        return simulate_mujoco(variant, mode, MuJoCoOptions(step=half * options.mujoco_step))
+    return record(simulate(variant, mode, options=tolerance, warning=False))
 
 
 @checked_arguments()

@@ -20,7 +20,6 @@ from paraflex.designs.derivatives.steps import Stepped, another_layout, complex_
 from paraflex.designs.run import Task
 from paraflex.designs.setting import Setting
 from paraflex.dynamics import (
-    InputSignals,
     System,
     acting_loads,
     build_system,
@@ -294,17 +293,13 @@ class Change:
                 splines(nominal.times + place * d_times, torques + place * change, knots + place * d_knots)
                 for place in places.places
             ]
-            near = [[np.concatenate([s.breaks, s.coefficients.ravel()]) for s in each] for each in found]
-            changes = [places.derivative(list(each)).value for each in zip(*near, strict=True)]
+            changes = [places.derivative([numbers_of(one) for one in each]).value for each in zip(*found, strict=True)]
         else:
             found = splines(nominal.times, change, knots)
-            changes = [np.concatenate([0.0 * s.breaks, s.coefficients.ravel()]) for s in found]
+            changes = [numbers_of(one._replace(breaks=0.0 * one.breaks)) for one in found]
         signals = tuple(
-            InputSignals(
-                stepped(signal.breaks, each[: signal.breaks.size]),
-                stepped(signal.coefficients, each[signal.breaks.size :].reshape(signal.coefficients.shape)),
-            )
-            for signal, each in zip(nominal.signals, changes, strict=True)
+            with_numbers(one, stepped(numbers_of(one), each))
+            for one, each in zip(nominal.signals, changes, strict=True)
         )
         return replace(nominal, signals=signals, knots=stepped(knots, d_knots), times=stepped(nominal.times, d_times))
 
@@ -314,8 +309,8 @@ class Change:
         d_knots, d_times = part(torques.knots), part(self.sampled.times)
         for place, near in zip(self.stencil.places, self.near, strict=True):
             moved = [
-                InputSignals(s.breaks.real + place * part(s.breaks), s.coefficients.real + place * part(s.coefficients))
-                for s in torques.signals
+                with_numbers(one, np.real(numbers) + place * part(numbers))
+                for one, numbers in zip(nominal.torques.signals, map(numbers_of, torques.signals), strict=True)
             ]
             signals, knots = pack_signals(near.mechanism, moved, near.end)
             times = problem.times + place * d_times

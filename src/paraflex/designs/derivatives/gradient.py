@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -44,8 +45,6 @@ class ModeGradients:
         Gradients with respect to the parameters by column.
     errors : dict of str to (parameters,) array
         Estimated errors of `gradients` from difference formulas, applied to numbers of the file and to signals.
-    steps : int
-        Number of accepted steps.
     residual : float
         Largest relative last correction of the stage equations; see `RunDerivatives`.
     """
@@ -54,7 +53,6 @@ class ModeGradients:
     values: dict[str, float]
     gradients: dict[str, Array]
     errors: dict[str, Array]
-    steps: int
     residual: float
 
 
@@ -100,11 +98,11 @@ def mode_gradients(setting: Setting, task: Task, sizes: Sequence[float | None] |
     sizes = [None] * len(setting.names) if sizes is None else sizes
     sizes = [size_of(setting, task, k, size) for k, size in enumerate(sizes)]
     changes = [Change(setting, task, planned, k, size) for k, size in enumerate(sizes)]
-    return [_of_mode(setting, run_inputs(planned, options, mode), mode, changes) for mode in setting.modes]
+    return [_of_mode(setting, run_inputs(planned, options, planned.torques(mode)), changes) for mode in setting.modes]
 
 
-def _of_mode(setting: Setting, nominal: RunInputs, mode: str, changes: Sequence[Change]) -> ModeGradients:
-    run = simulate(nominal.task, mode, options=nominal.options, warning=False)
+def _of_mode(setting: Setting, nominal: RunInputs, changes: Sequence[Change]) -> ModeGradients:
+    run = simulate(nominal.task, nominal.torques.mode, options=nominal.options, warning=False)
     if run.solution.singular_positions:
         time = run.solution.singular_positions[0]
         raise NumericalError(
@@ -115,7 +113,11 @@ def _of_mode(setting: Setting, nominal: RunInputs, mode: str, changes: Sequence[
     of_mode = [change.of_mode(nominal) for change in changes]
     found = run_derivatives(nominal.problem, nominal.options, [each.direction for each in of_mode])
     names = metric_columns(run, smooth_metrics(setting.metrics))
-    here = run_traces(_with_motion(run, nominal, found.motion))
+    # The motion whose steps are solved to rounding.
+    motion = found.motion
+    energy = energies(nominal.problem.system.packed, motion.q, motion.v, motion.multipliers)
+    solution = _with_motion(run.solution, motion, energy)
+    here = run_traces(replace(run, torques=nominal.torques, condition=nominal.condition, solution=solution))
     slopes = [_slopes(setting, run, here, nominal, found, k, each) for k, each in enumerate(of_mode)]
     sizes = np.array([change.size for change in changes])
     values = np.array(slopes).reshape(len(changes), len(names)).T / sizes
@@ -125,19 +127,16 @@ def _of_mode(setting: Setting, nominal: RunInputs, mode: str, changes: Sequence[
         values=measure(run, setting.metrics),
         gradients=dict(zip(names, values, strict=True)),
         errors=dict(zip(names, errors, strict=True)),
-        steps=found.steps,
         residual=found.residual,
     )
 
 
-def _with_motion(run: TrackingRun, nominal: RunInputs, motion: Motion) -> TrackingRun:
-    """Return the run with the motion whose steps are solved to rounding."""
-    energy = energies(nominal.problem.system.packed, motion.q, motion.v, motion.multipliers)
-    solution = replace(
-        run.solution, q=motion.q, v=motion.v, a=motion.a, multipliers=motion.multipliers, kinetic_energy=energy[:, 0],
-        strain_energy=energy[:, 1], work=motion.work + energy[:, 2] - energy[0, 2],
+def _with_motion(solution: Solution, motion: Motion, energy: Array, **more: Any) -> Solution:
+    """Return the solution with another motion, its `energies`, and other fields."""
+    return replace(
+        solution, q=motion.q, v=motion.v, a=motion.a, multipliers=motion.multipliers, kinetic_energy=energy[:, 0],
+        strain_energy=energy[:, 1], work=motion.work + energy[:, 2] - energy[0, 2], **more,
     )  # fmt: skip
-    return replace(run, torques=nominal.torques, condition=nominal.condition, solution=solution)
 
 
 def _slopes(
@@ -151,12 +150,9 @@ def _slopes(
 ) -> Array:
     """Return the derivatives of the metrics by parameter k, times its size, from a run with a complex step."""
     direction, along = change.direction, Motion(*(each[k] for each in found.derivatives))
-    q, v, a, multipliers, work = (stepped(x, dx) for x, dx in zip(found.motion, along, strict=True))
+    motion = Motion(*(stepped(x, dx) for x, dx in zip(found.motion, along, strict=True)))
     energy = _stepped_energies(nominal, found.motion, along, direction)
-    solution: Solution = replace(
-        run.solution, t=stepped(nominal.problem.times, direction.times), q=q, v=v, a=a, multipliers=multipliers,
-        kinetic_energy=energy[:, 0], strain_energy=energy[:, 1], work=work + energy[:, 2] - energy[0, 2],
-    )  # fmt: skip
+    solution = _with_motion(run.solution, motion, energy, t=stepped(nominal.problem.times, direction.times))
     moved = TrackingRun(change.task, change.torques, change.condition, solution, run.method)
     values = metric_values(run_traces(moved), here, smooth_metrics(setting.metrics))
     # The derivative of a metric that is NaN is NaN.

@@ -153,12 +153,7 @@ def check_differentiable_study(setting: Setting, values: Sequence[float], column
         size_of(setting, Task(0, 0, tuple(values), setting.paths[0]), k, 1.0)
 
 
-def run_inputs(planned: TrackingTask, options: IntegrationOptions, mode: str) -> RunInputs:
-    """Return the inputs of the run of a mode."""
-    return inputs_with_torques(planned, options, planned.torques(mode))
-
-
-def inputs_with_torques(planned: TrackingTask, options: IntegrationOptions, torques: FeedForward) -> RunInputs:
+def run_inputs(planned: TrackingTask, options: IntegrationOptions, torques: FeedForward) -> RunInputs:
     """Return the inputs of a run with feed-forward torques, as in `simulate`."""
     times = planned.motion.t
     signals, knots = pack_signals(planned.mechanism, torques.signals, float(times[-1]))

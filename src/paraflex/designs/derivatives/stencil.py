@@ -48,14 +48,13 @@ class Stencil:
         return Difference(fine, np.abs(fine - coarse))
 
 
-def make_stencil(places: range | tuple[int, ...], spacing: float) -> Stencil:
-    """Return the stencil of points in units of a spacing; the coarser formula omits the outermost two."""
+def _stencil(places: range | tuple[int, ...]) -> Stencil:
+    """Return the stencil of points in units of the spacing; the coarser formula omits the outermost two."""
     x = np.array(places, dtype=float)
     near = np.argsort(np.abs(x), kind="stable")[:-2]
-    weights, coarse = np.zeros(x.size), np.zeros(x.size)
-    weights[:] = _weights(x)
+    coarse = np.zeros(x.size)
     coarse[near] = _weights(x[near])
-    return Stencil(tuple(spacing * x), weights / spacing, coarse / spacing)
+    return Stencil(tuple(_STENCIL_SPACING * x), _weights(x) / _STENCIL_SPACING, coarse / _STENCIL_SPACING)
 
 
 def _weights(places: Array) -> Array:
@@ -69,7 +68,7 @@ def _weights(places: Array) -> Array:
 
 # Central differences, and one-sided differences to either side.
 STENCILS = (
-    make_stencil((-4, -3, -2, -1, 1, 2, 3, 4), _STENCIL_SPACING),
-    make_stencil(range(9), _STENCIL_SPACING),
-    make_stencil(range(0, -9, -1), _STENCIL_SPACING),
+    _stencil((-4, -3, -2, -1, 1, 2, 3, 4)),
+    _stencil(range(9)),
+    _stencil(range(0, -9, -1)),
 )

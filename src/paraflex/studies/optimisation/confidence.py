@@ -11,6 +11,7 @@ import numpy as np
 
 from paraflex.arrays import Array
 from paraflex.campaign.study import Result
+from paraflex.results.numbers import finite_or_none
 from paraflex.studies.optimisation.evaluate import EvaluatedDesign
 from paraflex.studies.optimisation.fit import residuals
 from paraflex.studies.optimisation.objective import Target
@@ -54,8 +55,8 @@ class Confidence:
     errors: Mapping[str, float | None]
     reasons: Mapping[str, str]
     freedom: int
-    correlation: Array = field(repr=False)
     free: tuple[str, ...]
+    correlation: Array = field(repr=False)
     condition: float
     weakest: Mapping[str, float]
 
@@ -66,15 +67,10 @@ class Confidence:
 
     def to_dict(self) -> dict[str, Any]:
         """Return the estimate as plain values, with None for infinity and NaN, which JSON does not have."""
-        return {
-            "deviations": dict(self.deviations),
-            "errors": dict(self.errors),
-            "reasons": dict(self.reasons),
-            "freedom": self.freedom,
+        return vars(self) | {
             "free": list(self.free),
-            "correlation": [[x if math.isfinite(x) else None for x in row] for row in self.correlation.tolist()],
-            "condition": self.condition if math.isfinite(self.condition) else None,
-            "weakest": dict(self.weakest),
+            "correlation": [[finite_or_none(x) for x in row] for row in self.correlation.tolist()],
+            "condition": finite_or_none(self.condition),
             "telling": self.identifiable,
         }
 

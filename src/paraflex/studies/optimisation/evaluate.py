@@ -6,6 +6,7 @@ import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -13,12 +14,11 @@ import numpy as np
 from paraflex.arrays import Array
 from paraflex.campaign import Engine, Journal, LostWorker, Row, checked_rows, outcomes
 from paraflex.campaign.study import Result
-from paraflex.designs.run import STATUS_COMPLETE, Outcome, Task, lost, run_id, run_task
+from paraflex.designs.run import STATUS_COMPLETE, Outcome, RunTask, Task, lost, run_id, run_task
 from paraflex.designs.setting import Setting
 from paraflex.studies.optimisation.study import DesignStudy
 
 Design = tuple[float, ...]
-RunTask = Callable[..., Outcome]
 
 
 class LimitReached(Exception):
@@ -68,10 +68,11 @@ class EvaluatedDesign:
         return np.array([row[column] for row in self.rows], dtype=float)
 
 
+@dataclass(eq=False)
 class Evaluate:
     """Evaluator of designs, which reads existing rows from the journal instead of computing them again.
 
-    Parameters
+    Attributes
     ----------
     study : DesignStudy
         Study whose designs are evaluated.
@@ -87,26 +88,19 @@ class Evaluate:
         Function that computes exact derivatives for a task, in rows as those of `slopes.run_slopes`.
     """
 
-    def __init__(
-        self,
-        study: DesignStudy[Result],
-        journal: Journal,
-        engine: Engine,
-        run: RunTask = run_task,
-        on_evaluated: Callable[[Evaluate, EvaluatedDesign], None] | None = None,
-        run_slopes: RunTask | None = None,
-    ) -> None:
-        self.study = study
-        self.journal = journal
-        self.engine = engine
-        self.run = run
-        self.on_evaluated = on_evaluated
-        self.run_slopes = run_slopes
+    study: DesignStudy[Result]
+    journal: Journal
+    engine: Engine
+    run: RunTask = run_task
+    on_evaluated: Callable[[Evaluate, EvaluatedDesign], None] | None = None
+    run_slopes: RunTask | None = None
+
+    def __post_init__(self) -> None:
         self.known: dict[Design, EvaluatedDesign] = {}
         self.fresh: int = 0
-        self._rows = {row["id"]: row for row in checked_rows(journal)}
+        self._rows = {row["id"]: row for row in checked_rows(self.journal)}
         self._numbers: dict[Design, int] = {}
-        self._single = {mode: replace(study.setting, modes=(mode,)) for mode in study.setting.modes}
+        self._single = [replace(self.study.setting, modes=(mode,)) for mode in self.study.setting.modes]
 
     @property
     def history(self) -> list[EvaluatedDesign]:
@@ -134,6 +128,10 @@ class Evaluate:
             raise LimitReached
         return [self.known[design] for design in designs]
 
+    def at(self, x: Array) -> EvaluatedDesign:
+        """Evaluate the design at a point of the unit cube."""
+        return self([self.study.design(x)])[0]
+
     def add_slopes(self, at: EvaluatedDesign) -> EvaluatedDesign:
         """Compute exact derivatives at a design, store them in its rows, and return the extended design."""
         assert self.run_slopes is not None
@@ -145,8 +143,7 @@ class Evaluate:
 
     def _read(self, design: Design) -> bool:
         setting = self.study.setting
-        tasks = [Task(0, 0, design, path) for path in setting.paths]
-        ids = [run_id(setting, task, mode) for task in tasks for mode in setting.modes]
+        ids = [run_id(setting, Task(0, 0, design, path), mode) for path in setting.paths for mode in setting.modes]
         found = all(each in self._rows for each in ids)
         if found:
             self._keep(design, tuple(self._rows[each] for each in ids))
@@ -160,17 +157,18 @@ class Evaluate:
 
     def _compute(self, designs: list[Design], run: RunTask) -> Iterator[tuple[Design, tuple[Row, ...]]]:
         """Compute designs, and yield each with all its rows in order of completion."""
-        setting = self.study.setting
+        # Those of one design.
+        setting, runs = self.study.setting, self.study.base.runs
         rows: dict[Design, dict[tuple[str, str], Row]] = {design: {} for design in designs}
         for job, outcome in outcomes(self.engine, partial(_do, run), self._jobs(designs)):
             if isinstance(outcome, LostWorker):
                 outcome = lost(job.setting, job.task, str(outcome))
             design = job.task.values
             rows[design] |= {(row["path"], row["mode"]): row for row in outcome.rows}
-            if len(rows[design]) == self.study.runs:
+            if len(rows[design]) == runs:
                 ordered = [rows[design][path, mode] for path in setting.paths for mode in setting.modes]
                 number = self._numbers[design]
-                first = number * self.study.runs
+                first = number * runs
                 yield design, tuple(row | {"run": first + k, "design": number} for k, row in enumerate(ordered))
 
     def _jobs(self, designs: list[Design]) -> Iterator[Job]:
@@ -180,7 +178,38 @@ class Evaluate:
         for design in designs:
             for number, path in enumerate(setting.paths):
                 task = Task(number, self._numbers[design], design, path)
-                yield from (Job(each, task) for each in (self._single.values() if apart else (setting,)))
+                yield from (Job(each, task) for each in (self._single if apart else (setting,)))
+
+
+@dataclass(frozen=True)
+class Session:
+    """Results of a session of a search.
+
+    Attributes
+    ----------
+    folder : Path
+        Folder of the study.
+    evaluate : Evaluate
+        Evaluator with all evaluated designs.
+    stopped : str
+        Reason of termination, as text.
+    interrupted : bool
+        Whether the user stopped the session.
+    seconds : float
+        Wall time of the session [s].
+    """
+
+    folder: Path
+    evaluate: Evaluate
+    stopped: str
+    interrupted: bool
+    seconds: float
+
+    @property
+    def start(self) -> EvaluatedDesign | None:
+        """Start of the search; None if it does not run."""
+        start = self.evaluate.known.get(self.evaluate.study.start)
+        return start if start is not None and start.complete else None
 
 
 class Job(NamedTuple):

@@ -7,11 +7,9 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from paraflex.arrays import Array
-from paraflex.campaign.study import Result
 from paraflex.studies.optimisation.evaluate import Evaluate, EvaluatedDesign
 from paraflex.studies.optimisation.objective import Target
 from paraflex.studies.optimisation.slopes import Slopes
-from paraflex.studies.optimisation.study import DesignStudy
 
 # Default tolerance of the fit: relative change of the cost and of the parameters, and norm of the gradient.
 _FIT_TOLERANCE = 1e-6
@@ -35,9 +33,7 @@ def closest(targets: Sequence[Target], designs: Sequence[EvaluatedDesign]) -> Ev
     return min(complete, key=lambda each: (root_mean_square(targets, each), each.number), default=None)
 
 
-def fit(
-    study: DesignStudy[Result], targets: Sequence[Target], evaluate: Evaluate, slopes: Slopes, start: EvaluatedDesign
-) -> str:
+def fit(targets: Sequence[Target], evaluate: Evaluate, slopes: Slopes, start: EvaluatedDesign) -> str:
     """Minimise the residuals from a start, and return the reason of termination as text.
 
     A trial design that does not run has infinite residuals, and SciPy's trust-region method then shortens the step.
@@ -49,19 +45,14 @@ def fit(
     """
     from scipy.optimize import least_squares
 
+    study = evaluate.study
     given = study.search.tolerance
     tolerance = _FIT_TOLERANCE if given is None else given
 
-    def values(x: Array) -> Array:
-        return residuals(targets, evaluate([study.design(x)])[0])
-
-    def jacobian(x: Array) -> Array:
-        return residual_slopes(targets, slopes(evaluate([study.design(x)])[0]))
-
     found = least_squares(
-        values,
+        lambda x: residuals(targets, evaluate.at(x)),
         study.unit(start.design),
-        jac=jacobian,  # pyright: ignore[reportArgumentType]
+        jac=lambda x: residual_slopes(targets, slopes(evaluate.at(x))),  # pyright: ignore[reportArgumentType]
         bounds=(0.0, 1.0),
         method="trf",
         ftol=tolerance,

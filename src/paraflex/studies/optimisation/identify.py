@@ -2,27 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
 from typing import Any, ClassVar
 
 from paraflex.arguments import checked_arguments, named_in_errors
-from paraflex.campaign import OnProgress, Progress, Workers, kept_in
+from paraflex.campaign import OnProgress, Workers
+from paraflex.designs.run import RunTask
 from paraflex.designs.schema import study_table
 from paraflex.designs.units import check_unit_of_metric
 from paraflex.errors import InputError, suggestion
 from paraflex.studies.optimisation.confidence import Confidence, checked, confidence
-from paraflex.studies.optimisation.evaluate import Evaluate, EvaluatedDesign, LimitReached, RunTask
+from paraflex.studies.optimisation.evaluate import Evaluate, EvaluatedDesign, LimitReached, Session
 from paraflex.studies.optimisation.fit import closest, fit, residual_slopes, root_mean_square
 from paraflex.studies.optimisation.objective import Target
 from paraflex.studies.optimisation.problem import running_start
 from paraflex.studies.optimisation.result import SearchResult, at_bounds, of_session
 from paraflex.studies.optimisation.schema import StudyTable, TargetTable
-from paraflex.studies.optimisation.session import Session, sampled_start, search
+from paraflex.studies.optimisation.session import SearchStudy, Solver, sampled_start
 from paraflex.studies.optimisation.slopes import ExactSlopes, no_exact_slopes, slopes_of
-from paraflex.studies.optimisation.study import DesignStudy, SweepStudy, base_study, read_search
+from paraflex.studies.optimisation.study import SweepStudy, base_study, read_search
 
 
 @dataclass(frozen=True)
@@ -46,7 +45,9 @@ class TargetResult:
 
     def to_dict(self) -> dict[str, Any]:
         """Return target, metric and residual as plain values."""
-        return self.target.to_dict() | {"reached": self.reached, "start": self.start, "residual": self.residual}
+        target = self.target
+        of_target = {"path": target.path, "mode": target.mode, "metric": target.column, "value": target.value}
+        return of_target | {"reached": self.reached, "start": self.start, "residual": self.residual}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -83,7 +84,7 @@ class IdentificationResult(SearchResult):
 
 @named_in_errors("an identification", "what load_identification returns")
 @dataclass(frozen=True)
-class IdentificationStudy(DesignStudy[IdentificationResult]):
+class IdentificationStudy(SearchStudy[IdentificationResult]):
     """Identification of the parameters that reproduce targets, by bounded least squares; see `DesignStudy`.
 
     Attributes
@@ -104,19 +105,8 @@ class IdentificationStudy(DesignStudy[IdentificationResult]):
         """Return the targets as plain values."""
         return {"targets": [vars(target) for target in self.targets]}
 
-    def run(
-        self,
-        folder: str | Path | None = None,
-        *,
-        workers: Workers | None = None,
-        on_progress: OnProgress | None = None,
-        run: RunTask | None = None,
-    ) -> IdentificationResult:
-        """Identify the parameters; see `OptimisationStudy.run`."""
-        folder, solution = kept_in(folder), _Solution(self)
-        watch = None if on_progress is None else _watch(self, on_progress)
-        result = partial(_result, self, folder, solution)
-        return search(self, folder, (workers or Workers()).open, solution.solve, watch, run=run, result=result)
+    def _solver(self) -> Solver[IdentificationResult]:
+        return _Identifier(self)
 
 
 @checked_arguments()
@@ -187,31 +177,56 @@ def _one(field: str, name: str | None, known: tuple[str, ...]) -> str:
     return name
 
 
-class _Solution:
-    """Solution of an identification: best design, confidence intervals there, and kind of derivatives."""
+@dataclass
+class _Identifier(Solver[IdentificationResult]):
+    """Least-squares fit: best design, confidence intervals there, kind of derivatives, and least residual so far."""
 
-    def __init__(self, study: IdentificationStudy) -> None:
-        self.study = study
-        self.best: EvaluatedDesign | None = None
-        self.confidence: Confidence | None = None
-        self.derivatives = ""
+    study: IdentificationStudy
+    best: EvaluatedDesign | None = None
+    confidence: Confidence | None = None
+    derivatives: str = ""
+    residual: float | None = None
 
     def solve(self, evaluate: Evaluate) -> str:
         """Minimise the residuals from the best of the start and the initial samples; return the reason of the end."""
-        study, slopes = self.study, slopes_of(self.study, evaluate)
-        running_start(study, evaluate)
-        start = sampled_start(study, evaluate, lambda designs: closest(study.targets, designs))
-        stopped = fit(study, study.targets, evaluate, slopes, start)
-        self.best = best = closest(study.targets, evaluate.history)
+        study, targets, slopes = self.study, self.study.targets, slopes_of(evaluate)
+        running_start(evaluate)
+        start = sampled_start(evaluate, lambda designs: closest(targets, designs))
+        stopped = fit(targets, evaluate, slopes, start)
+        self.best = best = closest(targets, evaluate.history)
         assert best is not None
         try:
-            jacobian = residual_slopes(study.targets, slopes(best))
-            found = confidence(study, study.targets, best, jacobian, at_bounds(study, best.design))
-            self.confidence = checked(study, study.targets, evaluate, best, jacobian, found)
+            jacobian = residual_slopes(targets, slopes(best))
+            found = confidence(study, targets, best, jacobian, at_bounds(study, best.design))
+            self.confidence = checked(study, targets, evaluate, best, jacobian, found)
         except LimitReached:
             pass
         self.derivatives = _how(study, slopes)
         return stopped
+
+    def least(self, done: EvaluatedDesign) -> float | None:
+        """Return the least RMS residual so far; see `Solver`."""
+        if done.complete:
+            residual = root_mean_square(self.study.targets, done)
+            self.residual = residual if self.residual is None else min(residual, self.residual)
+        return self.residual
+
+    def result(self, session: Session) -> IdentificationResult:
+        """Return the design with the smallest residuals, with its metrics and those of the start."""
+        history, targets, start = session.evaluate.history, self.study.targets, session.start
+        best = self.best or closest(targets, history)
+        return IdentificationResult(
+            **of_session(session, best),
+            residual=None if best is None else root_mean_square(targets, best),
+            start_residual=None if start is None else root_mean_square(targets, start),
+            targets=tuple(_reached(target, best, start) for target in targets) if best and start else (),
+            confidence=self.confidence,
+            derivatives=self.derivatives,
+            history=tuple(
+                (each.number, root_mean_square(targets, each) if each.complete else None, each.complete)
+                for each in history
+            ),
+        )
 
 
 def _how(study: IdentificationStudy, slopes: object) -> str:
@@ -223,35 +238,6 @@ def _how(study: IdentificationStudy, slopes: object) -> str:
     return f"differences ({reason})" if reason else "differences"
 
 
-def _result(study: IdentificationStudy, folder: Path, solution: _Solution, session: Session) -> IdentificationResult:
-    history, targets = session.evaluate.history, study.targets
-    start, best = session.evaluate.known.get(study.start), solution.best or closest(targets, history)
-    running = start is not None and start.complete
-    return IdentificationResult(
-        **of_session(study, folder, session, best),
-        residual=None if best is None else root_mean_square(targets, best),
-        start_residual=root_mean_square(targets, start) if start is not None and running else None,
-        targets=tuple(_reached(target, best, start) for target in targets) if best and start and running else (),
-        confidence=solution.confidence,
-        derivatives=solution.derivatives,
-        history=tuple(
-            (each.number, root_mean_square(targets, each) if each.complete else None, each.complete) for each in history
-        ),
-    )
-
-
 def _reached(target: Target, best: EvaluatedDesign, start: EvaluatedDesign) -> TargetResult:
     reached, before = (float(each.metric(target.column)[target.run]) for each in (best, start))
     return TargetResult(target, reached, before, target.residual(best))
-
-
-def _watch(study: IdentificationStudy, on_progress: OnProgress) -> Callable[[Evaluate, EvaluatedDesign], None]:
-    least: list[float] = []
-
-    def watch(evaluate: Evaluate, done: EvaluatedDesign) -> None:
-        if done.complete:
-            least[:] = [min([root_mean_square(study.targets, done), *least])]
-        best = least[0] if least else None
-        on_progress(Progress(len(evaluate.known), study.search.evaluations, evaluate.fresh, best=best))
-
-    return watch

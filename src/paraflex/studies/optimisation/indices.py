@@ -14,11 +14,11 @@ from numpy.typing import NDArray
 from paraflex.arguments import checked_arguments
 from paraflex.arrays import Array
 from paraflex.campaign import OnProgress, Study, Workers
-from paraflex.designs.run import STATUS_COMPLETE, run_task
+from paraflex.designs.run import STATUS_COMPLETE, RunTask, run_task
 from paraflex.designs.samples import RANDOM
 from paraflex.designs.schema import SamplingTable, study_table
-from paraflex.designs.sweep import RunTask, SweepStudy, SweptResult, make_study
-from paraflex.errors import InputError, suggestion
+from paraflex.designs.sweep import SweepStudy, SweptResult, make_study
+from paraflex.errors import InputError, optional_package, suggestion
 from paraflex.limits import DESIGNS, at_most
 from paraflex.results.metrics import METRICS
 from paraflex.results.numbers import finite_or_none
@@ -258,12 +258,8 @@ def _problem(names: tuple[str, ...]) -> dict[str, Any]:
 
 
 def _salib() -> Any:
-    try:
-        import SALib
+    remedy = "pip install 'paraflex[indices]'"
+    with optional_package("global indices need SALib", field="indices", remedy=remedy):
         import SALib.analyze.sobol
         import SALib.sample.sobol
-    except ImportError:
-        raise InputError(
-            "global indices need SALib", field="indices", remedy="pip install 'paraflex[indices]'"
-        ) from None
     return SALib

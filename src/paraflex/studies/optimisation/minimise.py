@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from paraflex.arrays import Array
-from paraflex.errors import InputError
+from paraflex.errors import InputError, optional_package
 from paraflex.studies.optimisation.problem import DesignProblem
 
 SLSQP, TRUST, LBFGSB, SIMPLEX = "slsqp", "trust-constr", "l-bfgs-b", "nelder-mead"
@@ -80,43 +80,31 @@ def _trust(problem: DesignProblem, start: Array) -> str:
     limits = NonlinearConstraint(problem.slack, 0.0, np.inf, jac=problem.slack_gradient)  # pyright: ignore[reportArgumentType]
     constraints = [limits] if problem.objective.limits else []
     tolerance = _tolerance(problem)
-    options = {
-        "gtol": tolerance * problem.cost,
-        "xtol": tolerance,
-        "barrier_tol": tolerance,
-        "maxiter": _ITERATION_LIMIT,
-    }
+    options = {"gtol": tolerance * problem.cost, "xtol": tolerance, "barrier_tol": tolerance}
+    options |= {"maxiter": _ITERATION_LIMIT}
     return _scipy(problem, start, "trust-constr", constraints=constraints, options=options)
 
 
 def _lbfgsb(problem: DesignProblem, start: Array) -> str:
-    return _scipy(
-        problem,
-        start,
-        "L-BFGS-B",
-        options={"ftol": _tolerance(problem), "maxfun": _ITERATION_LIMIT, "maxiter": _ITERATION_LIMIT},
-    )
+    options = {"ftol": _tolerance(problem), "maxfun": _ITERATION_LIMIT, "maxiter": _ITERATION_LIMIT}
+    return _scipy(problem, start, "L-BFGS-B", options=options)
 
 
 def _scipy(problem: DesignProblem, start: Array, method: str, **given: Any) -> str:
     from scipy.optimize import minimize
 
-    bounds = [(0.0, 1.0)] * start.size
-    return _why_ended(minimize(problem.value, start, jac=problem.slope, method=method, bounds=bounds, **given))
+    functions = {"fun": problem.value, "jac": problem.slope}
+    return _why_ended(minimize(**(functions | given), x0=start, method=method, bounds=[(0.0, 1.0)] * start.size))
 
 
 def _simplex(problem: DesignProblem, start: Array) -> str:
-    from scipy.optimize import minimize
-
     # The edges point away from the nearer bound.
     corners = np.vstack([start, start + np.diag(np.where(start > 0.5, -_SIMPLEX, _SIMPLEX))])
     tolerance = _tolerance(problem)
     problem.scores(list(corners))
     options = {"initial_simplex": corners, "xatol": np.sqrt(tolerance), "fatol": tolerance * problem.cost}
-    bounds, many = [(0.0, 1.0)] * start.size, {"maxiter": _ITERATION_LIMIT, "maxfev": _ITERATION_LIMIT}
-    return _why_ended(
-        minimize(lambda x: problem.scores([x])[0], start, method="Nelder-Mead", bounds=bounds, options=options | many)
-    )
+    options |= {"maxiter": _ITERATION_LIMIT, "maxfev": _ITERATION_LIMIT}
+    return _scipy(problem, start, "Nelder-Mead", fun=lambda x: problem.scores([x])[0], jac=None, options=options)
 
 
 def _evolution(problem: DesignProblem, start: Array) -> str:
@@ -140,7 +128,9 @@ def _evolution(problem: DesignProblem, start: Array) -> str:
 
 
 def _optuna(problem: DesignProblem, start: Array) -> str:
-    optuna = _import_optuna()
+    remedy = "pip install 'paraflex[optuna]'"
+    with optional_package("Optuna is not installed", field="search.method", value=OPTUNA, remedy=remedy):
+        import optuna
     optuna.logging.set_verbosity(optuna.logging.WARNING)
     names = problem.study.setting.names
     study = optuna.create_study(sampler=optuna.samplers.TPESampler(seed=problem.study.search.seed))
@@ -155,16 +145,6 @@ def _optuna(problem: DesignProblem, start: Array) -> str:
 def _why_ended(result: Any) -> str:
     text = str(result.message).strip().rstrip(".")
     return text[0].lower() + text[1:]
-
-
-def _import_optuna() -> Any:
-    try:
-        import optuna
-    except ImportError:
-        raise InputError(
-            "Optuna is not installed", field="search.method", value=OPTUNA, remedy="pip install 'paraflex[optuna]'"
-        ) from None
-    return optuna
 
 
 _METHODS: Mapping[str, Callable[[DesignProblem, Array], str]] = {

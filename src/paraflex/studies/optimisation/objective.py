@@ -4,22 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, Protocol
 
 import numpy as np
 
 from paraflex.arrays import Array
 from paraflex.mechanism.quantities import known
+from paraflex.studies.optimisation.evaluate import EvaluatedDesign
 
 WORST, MEAN = "worst", "mean"
-
-
-class Measured(Protocol):
-    """Protocol of a design with complete runs."""
-
-    def metric(self, column: str) -> Array:
-        """Return a metric of every run (runs,)."""
-        ...
 
 
 @dataclass(frozen=True)
@@ -51,21 +43,21 @@ class Objective:
         """Columns of the objective and its limits, each once."""
         return tuple(dict.fromkeys([*self.weights, *(column for column, _ in self.limits)]))
 
-    def metrics(self, design: Measured) -> dict[str, float]:
+    def metrics(self, design: EvaluatedDesign) -> dict[str, float]:
         """Compute the worst or mean value of every metric."""
         return {column: float(self._shares(design, column) @ design.metric(column)) for column in self.columns}
 
-    def scales(self, start: Measured) -> dict[str, float]:
+    def scales(self, start: EvaluatedDesign) -> dict[str, float]:
         """Compute the scales by which metrics are divided, from the design at the start; 1 if not `relative`."""
         metrics = self.metrics(start)
         return {column: abs(metrics[column]) if self.relative else 1.0 for column in self.weights}
 
-    def value(self, design: Measured, scales: Mapping[str, float]) -> float:
+    def value(self, design: EvaluatedDesign, scales: Mapping[str, float]) -> float:
         """Compute the objective, the sum of weight times metric divided by its scale."""
         metrics = self.metrics(design)
         return sum(weight * metrics[column] / scales[column] for column, weight in self.weights.items())
 
-    def slope(self, design: Measured, scales: Mapping[str, float], slopes: Mapping[str, Array]) -> Array:
+    def slope(self, design: EvaluatedDesign, scales: Mapping[str, float], slopes: Mapping[str, Array]) -> Array:
         """Compute the derivatives of `value` (parameters,) from those of the metrics (runs, parameters)."""
         terms = [
             weight / scales[column] * (self._shares(design, column) @ slopes[column])
@@ -73,21 +65,21 @@ class Objective:
         ]
         return np.sum(terms, axis=0)
 
-    def slack(self, design: Measured) -> Array:
+    def slack(self, design: EvaluatedDesign) -> Array:
         """Compute the margins of metrics to their limits (limits,), relative to the limit (to 1 if it is 0)."""
         metrics = self.metrics(design)
         return np.array([(limit - metrics[column]) / (abs(limit) or 1.0) for column, limit in self.limits])
 
-    def slack_gradient(self, design: Measured, slopes: Mapping[str, Array]) -> Array:
+    def slack_gradient(self, design: EvaluatedDesign, slopes: Mapping[str, Array]) -> Array:
         """Compute the derivatives of `room` (limits, parameters)."""
         rows = [-(self._shares(design, column) @ slopes[column]) / (abs(limit) or 1.0) for column, limit in self.limits]
         return np.array(rows)
 
-    def violation(self, design: Measured) -> float:
+    def violation(self, design: EvaluatedDesign) -> float:
         """Compute the sum of the relative violations of the limits."""
         return float(np.sum(np.maximum(-self.slack(design), 0.0)))
 
-    def _shares(self, design: Measured, column: str) -> Array:
+    def _shares(self, design: EvaluatedDesign, column: str) -> Array:
         """Compute the weight of each run in the worst or mean value of a metric (runs,)."""
         values = design.metric(column)
         if self.over == MEAN:
@@ -128,14 +120,10 @@ class Target:
         """Factor of the difference in the residual."""
         return self.weight / (abs(self.value) if self.relative else 1.0)
 
-    def residual(self, design: Measured) -> float:
+    def residual(self, design: EvaluatedDesign) -> float:
         """Compute weight times metric minus target value, divided by the absolute target value if `relative`."""
         return self.factor * float(design.metric(self.column)[self.run] - self.value)
 
     def slope(self, slopes: Mapping[str, Array]) -> Array:
         """Compute the derivatives of `residual` (parameters,) from those of the metrics (runs, parameters)."""
         return self.factor * slopes[self.column][self.run]
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return the target as plain values."""
-        return {"path": self.path, "mode": self.mode, "metric": self.column, "value": self.value}

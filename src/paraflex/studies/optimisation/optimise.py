@@ -4,25 +4,24 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from functools import partial
 from pathlib import Path
 from typing import Any, ClassVar
 
 from paraflex.arguments import checked_arguments, named_in_errors
-from paraflex.campaign import OnProgress, Progress, Workers, kept_in
+from paraflex.campaign import OnProgress, Workers
+from paraflex.designs.run import RunTask
 from paraflex.designs.schema import study_table
 from paraflex.designs.units import check_unit_of_metric
 from paraflex.errors import InputError
 from paraflex.results.metrics import Members
-from paraflex.studies.optimisation.evaluate import Evaluate, EvaluatedDesign, RunTask
+from paraflex.studies.optimisation.evaluate import Evaluate, EvaluatedDesign, Session
 from paraflex.studies.optimisation.minimise import DEFAULT_SEARCH, minimise
 from paraflex.studies.optimisation.objective import Objective
 from paraflex.studies.optimisation.problem import DesignProblem, best_of, holds_limits
 from paraflex.studies.optimisation.result import SearchResult, of_session
 from paraflex.studies.optimisation.schema import ObjectiveTable, StudyTable
-from paraflex.studies.optimisation.session import Session, sampled_start, search
-from paraflex.studies.optimisation.slopes import slopes_of
-from paraflex.studies.optimisation.study import DesignStudy, base_study, read_search
+from paraflex.studies.optimisation.session import SearchStudy, Solver, sampled_start
+from paraflex.studies.optimisation.study import base_study, read_search
 
 # Default step of finite differences, as a fraction of a parameter's range.
 _DIFFERENCE_SHARE = 1e-3
@@ -58,7 +57,7 @@ class OptimisationResult(SearchResult):
 
 @named_in_errors("an optimisation", "what load_optimisation returns")
 @dataclass(frozen=True)
-class OptimisationStudy(DesignStudy[OptimisationResult]):
+class OptimisationStudy(SearchStudy[OptimisationResult]):
     """Optimisation study: the search for the design with the least objective; see `DesignStudy`.
 
     Attributes
@@ -78,34 +77,8 @@ class OptimisationStudy(DesignStudy[OptimisationResult]):
         """Return the objective as plain values."""
         return {"objective": vars(self.objective) | {"weights": dict(self.objective.weights)}}
 
-    def run(
-        self,
-        folder: str | Path | None = None,
-        *,
-        workers: Workers | None = None,
-        on_progress: OnProgress | None = None,
-        run: RunTask | None = None,
-    ) -> OptimisationResult:
-        """Search for the best design; see `Study.run`.
-
-        The table of all runs, `result.json` and `best.toml` are written into the folder.
-
-        Parameters
-        ----------
-        folder, workers, on_progress
-            See `Study.run`.
-        run : callable, optional
-            Function that runs a task; `run_task` by default.
-
-        Raises
-        ------
-        InputError
-            Start that cannot be run; see `Study.run` for other reasons.
-        """
-        folder = kept_in(folder)
-        watch = _ProgressCallback(self, on_progress)
-        result, solve = partial(_result, self, folder), partial(_solve, self)
-        return search(self, folder, (workers or Workers()).open, solve, watch, run=run, result=result)
+    def _solver(self) -> Solver[OptimisationResult]:
+        return _Optimiser(self)
 
 
 @checked_arguments()
@@ -174,54 +147,48 @@ def _objective(table: ObjectiveTable, members: Members) -> Objective:
     return Objective(dict(table.minimise), table.over, table.relative, limits)
 
 
-def _solve(study: OptimisationStudy, evaluate: Evaluate) -> str:
-    objective = study.objective
-    problem = DesignProblem(study, objective, evaluate, slopes_of(study, evaluate))
-    start = sampled_start(study, evaluate, lambda designs: best_of(objective, problem.scales, designs))
-    return minimise(problem, study.search.method, study.unit(start.design))
+@dataclass
+class _Optimiser(Solver[OptimisationResult]):
+    """Minimisation of the objective, with the best of the designs reported so far."""
 
+    study: OptimisationStudy
+    best: EvaluatedDesign | None = None
+    scales: Mapping[str, float] | None = None
 
-def _result(study: OptimisationStudy, folder: Path, session: Session) -> OptimisationResult:
-    history, objective = session.evaluate.history, study.objective
-    start = session.evaluate.known.get(study.start)
-    running = start is not None and start.complete
-    scales = objective.scales(start) if start is not None and running else {}
-    best = best_of(objective, scales, history) if running else None
-    return OptimisationResult(
-        **of_session(study, folder, session, best),
-        method=study.search.method or DEFAULT_SEARCH,
-        goal=study.goal()["objective"],
-        objective=None if best is None else objective.value(best, scales),
-        start_objective=objective.value(start, scales) if start is not None and running else None,
-        metrics={} if best is None else objective.metrics(best),
-        start_metrics=objective.metrics(start) if start is not None and running else {},
-        holds_limits=best is not None and holds_limits(objective, best),
-        history=tuple(
-            (each.number, objective.value(each, scales), holds_limits(objective, each))
-            if running and each.complete
-            else (each.number, None, False)
-            for each in history
-        ),
-    )
+    def solve(self, evaluate: Evaluate) -> str:
+        """Minimise the objective; see `Solver`."""
+        problem = DesignProblem(self.study.objective, evaluate)
+        start = sampled_start(evaluate, lambda designs: best_of(self.study.objective, problem.scales, designs))
+        return minimise(problem, self.study.search.method, self.study.unit(start.design))
 
-
-class _ProgressCallback:
-    """Callback that reports the progress of an optimisation, with the best objective so far."""
-
-    def __init__(self, study: OptimisationStudy, on_progress: OnProgress | None) -> None:
-        self.study, self.objective, self.on_progress = study, study.objective, on_progress
-        self.best: EvaluatedDesign | None = None
-        self.scales: Mapping[str, float] | None = None
-
-    def __call__(self, evaluate: Evaluate, done: EvaluatedDesign) -> None:
-        """Record an evaluated design and report the progress; the first design is the start."""
-        if self.on_progress is None:
-            return
+    def least(self, done: EvaluatedDesign) -> float | None:
+        """Return the objective of the best design so far; see `Solver`. The first design is the start."""
         if self.scales is None and done.complete:
-            self.scales = self.objective.scales(done)
-        best = None
-        if self.scales is not None and all(self.scales.values()):
-            compared = [done] if self.best is None else [self.best, done]
-            self.best = best_of(self.objective, self.scales, compared)
-            best = None if self.best is None else self.objective.value(self.best, self.scales)
-        self.on_progress(Progress(len(evaluate.known), self.study.search.evaluations, evaluate.fresh, best=best))
+            self.scales = self.study.objective.scales(done)
+        if self.scales is None or not all(self.scales.values()):
+            return None
+        compared = [done] if self.best is None else [self.best, done]
+        self.best = best_of(self.study.objective, self.scales, compared)
+        return None if self.best is None else self.study.objective.value(self.best, self.scales)
+
+    def result(self, session: Session) -> OptimisationResult:
+        """Return the best of all designs, with its metrics and those of the start."""
+        history, objective, start = session.evaluate.history, self.study.objective, session.start
+        scales = {} if start is None else objective.scales(start)
+        best = None if start is None else best_of(objective, scales, history)
+        return OptimisationResult(
+            **of_session(session, best),
+            method=self.study.search.method or DEFAULT_SEARCH,
+            goal=self.study.goal()["objective"],
+            objective=None if best is None else objective.value(best, scales),
+            start_objective=None if start is None else objective.value(start, scales),
+            metrics={} if best is None else objective.metrics(best),
+            start_metrics={} if start is None else objective.metrics(start),
+            holds_limits=best is not None and holds_limits(objective, best),
+            history=tuple(
+                (each.number, objective.value(each, scales), holds_limits(objective, each))
+                if start is not None and each.complete
+                else (each.number, None, False)
+                for each in history
+            ),
+        )

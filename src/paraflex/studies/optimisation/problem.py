@@ -8,12 +8,10 @@ from functools import cached_property
 import numpy as np
 
 from paraflex.arrays import Array
-from paraflex.campaign.study import Result
 from paraflex.errors import InputError
 from paraflex.studies.optimisation.evaluate import Evaluate, EvaluatedDesign
 from paraflex.studies.optimisation.objective import Objective
-from paraflex.studies.optimisation.slopes import Slopes
-from paraflex.studies.optimisation.study import DesignStudy
+from paraflex.studies.optimisation.slopes import slopes_of
 
 # Relative violation of a limit that is tolerated.
 _LIMIT_EXCESS = 1e-6
@@ -29,14 +27,10 @@ class DesignProblem:
 
     Parameters
     ----------
-    study : DesignStudy
-        Study with the parameters and the start.
     objective : Objective
         Objective function and limits.
     evaluate : Evaluate
         Evaluator of designs.
-    slopes : Slopes
-        Derivatives of the metrics.
 
     Raises
     ------
@@ -44,19 +38,19 @@ class DesignProblem:
         Start that cannot be run, or metric that is zero at the start and therefore cannot serve as a scale.
     """
 
-    def __init__(self, study: DesignStudy[Result], objective: Objective, evaluate: Evaluate, slopes: Slopes) -> None:
-        self.study = study
+    def __init__(self, objective: Objective, evaluate: Evaluate) -> None:
+        self.study = evaluate.study
         self.evaluate = evaluate
-        self.slopes = slopes
+        self.slopes = slopes_of(evaluate)
         self.objective = objective
-        self.scales: Mapping[str, float] = objective.scales(running_start(study, evaluate))
+        self.scales: Mapping[str, float] = objective.scales(running_start(evaluate))
         for column, scale in self.scales.items():
             if scale == 0.0:
                 raise InputError(
                     "the metric is zero at the start, so nothing can be relative to it",
                     field=f"objective.minimise.{column}", remedy="write relative = false",
                 )  # fmt: skip
-        self.start: Array = study.unit(study.start)
+        self.start: Array = self.study.unit(self.study.start)
         # The gradient at a failed design points away from the last successful one.
         self._safe = self.start
 
@@ -66,24 +60,20 @@ class DesignProblem:
         (start,) = self.evaluate([self.study.start])
         return abs(self.objective.value(start, self.scales)) or 1.0
 
-    def at(self, x: Array) -> EvaluatedDesign:
-        """Evaluate the design at a point of the unit cube."""
-        return self.evaluate([self.study.design(x)])[0]
-
     def scores(self, places: Sequence[Array]) -> list[float]:
         """Compute the objective, with penalties for violated limits and failed designs, for gradient-free methods."""
         return [self._score(design) for design in self.evaluate([self.study.design(x) for x in places])]
 
     def value(self, x: Array) -> float:
         """Compute the objective for gradient-based methods; a failed design costs more than the start."""
-        design = self.at(x)
+        design = self.evaluate.at(x)
         if design.complete:
             return self.objective.value(design, self.scales)
         return _REFUSED * self.cost * (1.0 + float(np.linalg.norm(x - self._safe)))
 
     def slope(self, x: Array) -> Array:
         """Compute the derivatives of `value` (parameters,)."""
-        design = self.at(x)
+        design = self.evaluate.at(x)
         if design.complete:
             self._safe = np.array(x)
             return self.objective.slope(design, self.scales, self.slopes(design))
@@ -92,12 +82,12 @@ class DesignProblem:
 
     def slack(self, x: Array) -> Array:
         """Compute the margins of metrics to their limits (limits,); -1 if the design fails."""
-        design = self.at(x)
+        design = self.evaluate.at(x)
         return self.objective.slack(design) if design.complete else np.full(len(self.objective.limits), -1.0)
 
     def slack_gradient(self, x: Array) -> Array:
         """Compute the derivatives of `room` (limits, parameters); zero if the design fails."""
-        design = self.at(x)
+        design = self.evaluate.at(x)
         if design.complete:
             return self.objective.slack_gradient(design, self.slopes(design))
         return np.zeros((len(self.objective.limits), x.size))
@@ -111,7 +101,7 @@ class DesignProblem:
         return self.objective.value(design, self.scales)
 
 
-def running_start(study: DesignStudy[Result], evaluate: Evaluate) -> EvaluatedDesign:
+def running_start(evaluate: Evaluate) -> EvaluatedDesign:
     """Evaluate the start, and check that it runs.
 
     Raises
@@ -119,6 +109,7 @@ def running_start(study: DesignStudy[Result], evaluate: Evaluate) -> EvaluatedDe
     InputError
         Start that cannot be run.
     """
+    study = evaluate.study
     (start,) = evaluate([study.start])
     if not start.complete:
         values = ", ".join(f"{name} = {value:g}" for name, value in zip(study.setting.names, study.start, strict=True))

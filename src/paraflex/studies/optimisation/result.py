@@ -11,8 +11,7 @@ from typing import Any, ClassVar
 from paraflex.campaign import KeptResult
 from paraflex.campaign.study import Result
 from paraflex.files.overlay import overlaid
-from paraflex.studies.optimisation.evaluate import EvaluatedDesign
-from paraflex.studies.optimisation.session import Session
+from paraflex.studies.optimisation.evaluate import EvaluatedDesign, Session
 from paraflex.studies.optimisation.study import DesignStudy
 from paraflex.writing import GO_ON, write_json, write_text
 
@@ -84,21 +83,27 @@ class SearchResult(KeptResult):
         return {"kind": self.kind} | out | listed
 
     def write(self, study: DesignStudy[Result], folder: Path) -> None:
-        """Write `result.json`, and the model file of the best design if there is one."""
+        """Write `result.json`, and if there is a best design the mechanism's file with its parameter values."""
         write_json(folder / self.values_file, self.to_dict(), remedy=GO_ON)
-        if self.values:
-            write_best(folder, study, tuple(self.values.values()))
+        if not self.values:
+            return
+        from paraflex.files.document import document_text
+
+        setting = study.setting
+        data = overlaid(dict(setting.data), setting.numbers(tuple(self.values.values())))
+        lines = [f"# {setting.source}, with the numbers that the study {json.dumps(study.name)} found:"]
+        lines += [f"#   {json.dumps(name)}: {value!r}" for name, value in self.values.items()]
+        write_text(folder / BEST, "\n".join([*lines, "", document_text(data, setting.text)]))
 
 
-def of_session(
-    study: DesignStudy[Result], folder: Path, session: Session, best: EvaluatedDesign | None
-) -> dict[str, Any]:
+def of_session(session: Session, best: EvaluatedDesign | None) -> dict[str, Any]:
     """Return the fields of a `SearchResult` for a session and its best design, without the history."""
-    history, names = session.evaluate.history, study.setting.names
+    study, history = session.evaluate.study, session.evaluate.history
+    names = study.setting.names
     reasons = [each.reason for each in history if not each.complete]
     return {
         "name": study.name,
-        "folder": folder,
+        "folder": session.folder,
         "values": {} if best is None else dict(zip(names, best.design, strict=True)),
         "start": dict(zip(names, study.start, strict=True)),
         "units": study.setting.units(study.base.members),
@@ -118,21 +123,3 @@ def at_bounds(study: DesignStudy[Result], design: Sequence[float]) -> dict[str, 
     places = dict(zip(study.setting.names, study.unit(design), strict=True))
     low = {name: "low" for name, place in places.items() if place < _AT_BOUND}
     return low | {name: "high" for name, place in places.items() if place > 1.0 - _AT_BOUND}
-
-
-def write_best(folder: Path, study: DesignStudy[Result], design: tuple[float, ...]) -> Path:
-    """Write the mechanism's file with the parameter values of a design, and return its path.
-
-    Raises
-    ------
-    OutputError
-        Folder that cannot be written.
-    """
-    from paraflex.files.document import document_text
-
-    setting = study.setting
-    data = overlaid(dict(setting.data), setting.numbers(design))
-    lines = [f"# {setting.source}, with the numbers that the study {json.dumps(study.name)} found:"]
-    lines += [f"#   {json.dumps(name)}: {value!r}" for name, value in zip(setting.names, design, strict=True)]
-    write_text(folder / BEST, "\n".join([*lines, "", document_text(data, setting.text)]))
-    return folder / BEST

@@ -3,21 +3,23 @@
 from __future__ import annotations
 
 import time
+from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Protocol, TypeVar
+from typing import TYPE_CHECKING, Generic, TypeVar
 
-from paraflex.campaign import Engine, open_campaign
+from paraflex.campaign import OnProgress, Progress, Workers, kept_in, open_campaign
 from paraflex.campaign.study import Result
 from paraflex.compilation import compile_kernels_for
 from paraflex.designs.reopen import study_account
-from paraflex.designs.run import is_row_of, run_task, table_schema
+from paraflex.designs.run import RunTask, is_row_of, run_task, table_schema
 from paraflex.designs.samples import SOBOL, designs
 from paraflex.errors import InputError
-from paraflex.studies.optimisation.evaluate import Evaluate, EvaluatedDesign, LimitReached, RunTask
+from paraflex.studies.optimisation.evaluate import Evaluate, EvaluatedDesign, LimitReached, Session
 from paraflex.studies.optimisation.minimise import DEFAULT_SEARCH, WITH_SLOPES
+from paraflex.studies.optimisation.result import SearchResult
 from paraflex.studies.optimisation.slopes import (
     DIFFERENCES,
     EXACT,
@@ -32,89 +34,80 @@ if TYPE_CHECKING:
     import pyarrow as pa
 
 
+R_co = TypeVar("R_co", bound=SearchResult, covariant=True)
+
+
+class Solver(ABC, Generic[R_co]):
+    """Solution of a search in one session."""
+
+    @abstractmethod
+    def solve(self, evaluate: Evaluate) -> str:
+        """Request designs from the evaluator until the search ends, and return the reason of termination."""
+
+    @abstractmethod
+    def least(self, done: EvaluatedDesign) -> float | None:
+        """Return the least objective or residual so far, that of a newly evaluated design included; None if none."""
+
+    @abstractmethod
+    def result(self, session: Session) -> R_co:
+        """Return the result of the session, which is written together with the table."""
+
+
 @dataclass(frozen=True)
-class Session:
-    """Results of a session of a search.
+class SearchStudy(DesignStudy[R_co]):
+    """Search study that is run in a folder; see `DesignStudy`."""
 
-    Attributes
-    ----------
-    evaluate : Evaluate
-        Evaluator with all evaluated designs.
-    stopped : str
-        Reason of termination, as text.
-    interrupted : bool
-        Whether the user stopped the session.
-    seconds : float
-        Wall time of the session [s].
-    """
+    @abstractmethod
+    def _solver(self) -> Solver[R_co]:
+        """Return the solver of a session."""
 
-    evaluate: Evaluate
-    stopped: str
-    interrupted: bool
-    seconds: float
+    def run(
+        self,
+        folder: str | Path | None = None,
+        *,
+        workers: Workers | None = None,
+        on_progress: OnProgress | None = None,
+        run: RunTask | None = None,
+    ) -> R_co:
+        """Search for the best design; see `Study.run`.
+
+        The table of all runs, `result.json` and `best.toml` are written into the folder. A folder left by an earlier
+        session is continued: designs with rows in it are read.
+
+        Parameters
+        ----------
+        folder, workers, on_progress
+            See `Study.run`.
+        run : callable, optional
+            Function that runs a task; `run_task` by default.
+
+        Raises
+        ------
+        InputError
+            Start that cannot be run; see `Study.run` for other reasons.
+        """
+        folder, solver, began = kept_in(folder), self._solver(), time.perf_counter()
+        exact = _slopes_run(self, run)
+        account = study_account(self.name, self.setting, self.parameters, self.content())
+        schema = record_schema(self, slopes=exact is not None)
+        watch = None if on_progress is None else partial(_report, on_progress, solver)
+        with open_campaign(folder, account, schema, partial(is_row_of, self.setting)) as campaign:
+            compile_kernels_for(self.base.model().mechanism)
+            engine = (workers or Workers()).open()
+            evaluate = Evaluate(self, campaign.journal, engine, run or run_task, watch, exact)
+            try:
+                stopped, interrupted = _solved(evaluate, solver.solve), False
+            except KeyboardInterrupt:
+                stopped, interrupted = "interrupted", True
+            with campaign.published(finished=not interrupted) as new:
+                found = solver.result(Session(folder, evaluate, stopped, interrupted, time.perf_counter() - began))
+                found.write(self, new)
+        return found
 
 
-class SearchOutcome(Protocol):
-    """Protocol of the result of a search."""
-
-    def write(self, study: DesignStudy[Result], folder: Path) -> None:
-        """Write the result into a folder."""
-
-
-R = TypeVar("R", bound=SearchOutcome)
-
-
-def search(
-    study: DesignStudy[Result],
-    folder: Path,
-    open_workers: Callable[[], Engine],
-    solve: Callable[[Evaluate], str],
-    on_evaluated: Callable[[Evaluate, EvaluatedDesign], None] | None = None,
-    *,
-    run: RunTask | None = None,
-    result: Callable[[Session], R],
-) -> R:
-    """Run a search in a folder, which is locked meanwhile, and return its result.
-
-    Parameters
-    ----------
-    study : DesignStudy
-        Study to solve.
-    folder : Path
-        Folder of the study. A folder left by an earlier session is continued: designs with rows in it are read.
-    open_workers : callable
-        Function that starts the workers.
-    solve : callable
-        Search method: it requests designs from the evaluator and returns the reason of termination.
-    on_evaluated : callable, optional
-        Function called with the evaluator and each design when it is evaluated.
-    run : callable, optional
-        Function that runs a task: `run_task`, replaced in tests only.
-    result : callable
-        Function that builds the result of a session, which is written together with the table.
-
-    Raises
-    ------
-    InputError
-        Invalid study, folder of another study, or engine that is not available.
-    OutputError
-        Folder that can no longer be written. Results written before are kept, and the same call continues from them.
-    """
-    began = time.perf_counter()
-    exact = _slopes_run(study, run)
-    account = study_account(study.name, study.setting, study.parameters, study.content())
-    schema = record_schema(study, slopes=exact is not None)
-    with open_campaign(folder, account, schema, partial(is_row_of, study.setting)) as campaign:
-        compile_kernels_for(study.base.model().mechanism)
-        evaluate = Evaluate(study, campaign.journal, open_workers(), run or run_task, on_evaluated, exact)
-        try:
-            stopped, interrupted = _solved(evaluate, solve), False
-        except KeyboardInterrupt:
-            stopped, interrupted = "interrupted", True
-        with campaign.published(finished=not interrupted) as new:
-            found = result(Session(evaluate, stopped, interrupted, time.perf_counter() - began))
-            found.write(study, new)
-    return found
+def _report(on_progress: OnProgress, solver: Solver[SearchResult], evaluate: Evaluate, done: EvaluatedDesign) -> None:
+    total = evaluate.study.search.evaluations
+    on_progress(Progress(len(evaluate.known), total, evaluate.fresh, best=solver.least(done)))
 
 
 def record_schema(study: DesignStudy[Result], *, slopes: bool) -> pa.Schema:
@@ -129,9 +122,10 @@ def record_schema(study: DesignStudy[Result], *, slopes: bool) -> pa.Schema:
 
 
 def sampled_start(
-    study: DesignStudy[Result], evaluate: Evaluate, best: Callable[[list[EvaluatedDesign]], EvaluatedDesign | None]
+    evaluate: Evaluate, best: Callable[[list[EvaluatedDesign]], EvaluatedDesign | None]
 ) -> EvaluatedDesign:
     """Evaluate the start and the initial samples of the study, and return the best of them."""
+    study = evaluate.study
     number, batch = study.search.samples, [study.start]
     if number:
         points = designs(study.parameters, SOBOL, number, study.search.seed)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
-from typing import Protocol
 
 import numpy as np
 
@@ -33,20 +32,17 @@ def slope_column(column: str, parameter: str) -> str:
     return f"slope.{column}.{parameter}"
 
 
-class Slopes(Protocol):
-    """Protocol of a function that computes derivatives of the metrics of an objective or of targets."""
-
-    def __call__(self, at: EvaluatedDesign) -> Mapping[str, Array]:
-        """Compute the derivatives at a complete design, a (runs, parameters) array for each column."""
-        ...
+# Function that computes, at a complete design, the derivatives of metrics: a (runs, parameters) array for each column.
+Slopes = Callable[[EvaluatedDesign], Mapping[str, Array]]
 
 
-def slopes_of(study: DesignStudy[Result], evaluate: Evaluate) -> Slopes:
+def slopes_of(evaluate: Evaluate) -> Slopes:
     """Return exact derivatives if the evaluator computes them, else finite differences."""
-    differing = Differences(study, evaluate)
-    return differing if evaluate.run_slopes is None else ExactSlopes(study, evaluate, differing)
+    differing = Differences(evaluate, evaluate.study.search.difference)
+    return differing if evaluate.run_slopes is None else ExactSlopes(evaluate, differing)
 
 
+@dataclass
 class Differences:
     """Central differences with the step of the study, or with a step adapted to the noise of its metrics.
 
@@ -55,40 +51,46 @@ class Differences:
     the parameter (Press et al., Numerical Recipes, 5.7).
     """
 
-    def __init__(self, study: DesignStudy[Result], evaluate: Evaluate) -> None:
-        self.study = study
-        self.evaluate = evaluate
-        self.step = study.search.difference
+    evaluate: Evaluate
+    step: float | None
 
     def __call__(self, at: EvaluatedDesign) -> Mapping[str, Array]:
         """Compute the derivatives; see `Slopes`."""
         if self.step is None:
-            self.step = float(np.clip(np.cbrt(relative_noise(self.study, self.evaluate, at)), _LEAST_STEP, _MOST_STEP))
-        return differences(self.study, self.evaluate, at, self.step)
+            self.step = float(np.clip(np.cbrt(relative_noise(self.evaluate, at)), _LEAST_STEP, _MOST_STEP))
+        return differences(self.evaluate, at, self.step)
 
 
 @dataclass
 class ExactSlopes:
     """Exact derivatives of the runs, replaced by differences at designs without them; `reasons` holds the reasons."""
 
-    study: DesignStudy[Result]
     evaluate: Evaluate
     otherwise: Slopes
     reasons: list[str] = field(default_factory=list)
 
     def __call__(self, at: EvaluatedDesign) -> Mapping[str, Array]:
         """Compute the derivatives; see `Slopes`."""
-        if not _has_slopes(self.study, at):
+        study = self.evaluate.study
+        names = {column: [slope_column(column, name) for name in study.setting.names] for column in study.columns}
+        needed = [name for each in names.values() for name in each]
+        if any(not row.get(NO_SLOPES) and any(row.get(name) is None for name in needed) for row in at.rows):
             at = self.evaluate.add_slopes(at)
         for row in at.rows:
             if row.get(NO_SLOPES):
                 self.reasons.append(f'mode "{row["mode"]}": {row[NO_SLOPES]}')
                 return self.otherwise(at)
-        return exact_slopes(self.study, at)
+        # Scaled to unit-cube coordinates.
+        scale = study.per_unit(at.design)
+        return {
+            column: scale * np.array([[row[name] for name in each] for row in at.rows])
+            for column, each in names.items()
+        }
 
 
-def relative_noise(study: DesignStudy[Result], evaluate: Evaluate, at: EvaluatedDesign) -> float:
+def relative_noise(evaluate: Evaluate, at: EvaluatedDesign) -> float:
     """Estimate the largest relative noise of a metric from closely spaced designs on a line; 0 if one does not run."""
+    study = evaluate.study
     middle = study.unit(at.design)
     # Along the diagonal, away from the nearer bounds, over the span of the smallest central difference.
     along = np.where(middle > 0.5, -1.0, 1.0) * 2.0 * _LEAST_STEP
@@ -104,19 +106,18 @@ def relative_noise(study: DesignStudy[Result], evaluate: Evaluate, at: Evaluated
     return noise
 
 
-def differences(
-    study: DesignStudy[Result], evaluate: Evaluate, at: EvaluatedDesign, step: float
-) -> Mapping[str, Array]:
+def differences(evaluate: Evaluate, at: EvaluatedDesign, step: float) -> Mapping[str, Array]:
     """Compute central differences, with all designs evaluated at once.
 
     The step is a fraction of the range. It should be large compared with the noise from the choice of time steps, and
     small compared with the curvature of the metric. At a bound, or if one of the two designs fails, the difference is
     one-sided; if both fail it is zero.
     """
+    study = evaluate.study
     middle = study.unit(at.design)
     sides = np.clip(middle[:, None] + step * np.array([-1.0, 1.0]), 0.0, 1.0)
     done = evaluate([_moved(study, at, k, x) for k in range(middle.size) for x in sides[k]])
-    columns = {column: np.zeros((study.runs, middle.size)) for column in study.columns}
+    columns = {column: np.zeros((study.base.runs, middle.size)) for column in study.columns}
     for k in range(middle.size):
         usable = [each for each in (done[2 * k], at, done[2 * k + 1]) if each.complete]
         apart = study.unit(usable[-1].design)[k] - study.unit(usable[0].design)[k]
@@ -132,20 +133,6 @@ def _moved(study: DesignStudy[Result], at: EvaluatedDesign, k: int, place: float
         return at.design
     moved = study.design(np.full(len(at.design), place))[k]
     return (*at.design[:k], moved, *at.design[k + 1 :])
-
-
-def exact_slopes(study: DesignStudy[Result], at: EvaluatedDesign) -> Mapping[str, Array]:
-    """Return the exact derivatives stored in the rows, scaled to unit-cube coordinates; see `run_slopes`."""
-    scale = study.per_unit(at.design)
-    return {
-        column: scale * np.array([[row[slope_column(column, name)] for name in study.setting.names] for row in at.rows])
-        for column in study.columns
-    }
-
-
-def _has_slopes(study: DesignStudy[Result], at: EvaluatedDesign) -> bool:
-    columns = [slope_column(column, name) for column in study.columns for name in study.setting.names]
-    return all(row.get(NO_SLOPES) or all(row.get(each) is not None for each in columns) for row in at.rows)
 
 
 def no_exact_slopes(study: DesignStudy[Result]) -> str:
@@ -179,13 +166,12 @@ def run_slopes(
     """
     from paraflex.designs.derivatives.gradient import metric_gradients
 
-    single = {mode: replace(setting, modes=(mode,)) for mode in setting.modes}
     chosen = [size if value == 0.0 else None for size, value in zip(sizes, task.values, strict=True)]
     rows: list[Row] = []
-    for mode, alone in single.items():
+    for mode in setting.modes:
         row: Row = {"path": task.path, "mode": mode, NO_SLOPES: None}
         try:
-            ((_, _, slopes),) = metric_gradients(alone, task, sizes=chosen)
+            ((_, _, slopes),) = metric_gradients(replace(setting, modes=(mode,)), task, sizes=chosen)
             for column in columns:
                 found = [float(x) for x in slopes[column]]
                 if not np.all(np.isfinite(found)):
@@ -211,8 +197,7 @@ def noise_of(values: Array) -> Array:
     values : (points, ...) array
         Values at the points; the noise of each component is estimated separately.
     """
-    columns = values.reshape(values.shape[0], -1)
-    return np.array([_noise(column) for column in columns.T]).reshape(values.shape[1:])
+    return np.apply_along_axis(_noise, 0, values)
 
 
 def _noise(values: Array) -> float:

@@ -107,11 +107,6 @@ class DesignStudy(Study[R_co]):
         return tuple(self.base.designs[0].tolist())
 
     @property
-    def runs(self) -> int:
-        """Number of runs of a design: paths times modes."""
-        return self.base.runs
-
-    @property
     @abstractmethod
     def columns(self) -> tuple[str, ...]:
         """Metrics of the objective or targets."""
@@ -173,13 +168,9 @@ def base_study(table: StudyTable, folder: FilePath, columns: Mapping[str, str]) 
 
 def _check_range(field: str, entry: ParameterTable) -> None:
     for key in ("values", "number", "whole"):
-        if getattr(entry, key):
-            raise InputError(
-                "only sweeps have it",
-                field=f"{field}.{key}",
-                value=getattr(entry, key),
-                remedy="give only low and high",
-            )
+        if value := getattr(entry, key):
+            remedy = "give only low and high"
+            raise InputError("only sweeps have it", field=f"{field}.{key}", value=value, remedy=remedy)
     if entry.low is not None and entry.low == entry.high:
         raise InputError("low and high are equal", field=f"{field}.high", value=entry.high, remedy="leave it out")
 
@@ -187,17 +178,13 @@ def _check_range(field: str, entry: ParameterTable) -> None:
 def _check_column(field: str, column: str, members: Members) -> None:
     """Check that a column is one scalar of each run; a metric per motor, drive or joint needs the name of one."""
     metric, known = metric_of(column), metric_of(column).columns(members)
-    if metric.each and column not in known:
-        raise InputError(
-            f"this metric is one of each {metric.each}, and no {metric.each} is named",
-            field=field,
-            value=column,
-            remedy=suggestion(column, known),
-        )
-    if column not in known:
-        raise InputError(
-            "not a metric per motor, drive or joint", field=field, value=column, remedy=f'write "{metric.name}"'
-        )
+    if column in known:
+        return
+    problem, remedy = "not a metric per motor, drive or joint", f'write "{metric.name}"'
+    if metric.each:
+        problem = f"this metric is one of each {metric.each}, and no {metric.each} is named"
+        remedy = suggestion(column, known)
+    raise InputError(problem, field=field, value=column, remedy=remedy)
 
 
 def _nominal(setting: Setting, place: Place, field: str) -> float:
@@ -215,13 +202,8 @@ def _start(setting: Setting, places: tuple[Place, ...], parameter: SweptParamete
     field = f"vary.{parameter.name}.start"
     found = {_nominal(setting, place, field) for place in places} if given is None else {given}
     if len(found) > 1:
-        values = sorted(found)
-        raise InputError(
-            "its fields have different values in the mechanism's file, so that there is no start",
-            field=field,
-            value=values,
-            remedy="give a start",
-        )
+        problem = "its fields have different values in the mechanism's file, so that there is no start"
+        raise InputError(problem, field=field, value=sorted(found), remedy="give a start")
     (start,) = found
     low, high = parameter.ends
     if not low <= start <= high:
@@ -250,10 +232,8 @@ def read_search(table: SearchTable) -> Search:
         if value is not None and not value > 0:
             raise InputError("must be positive", field=f"search.{name}", value=value, remedy="leave it out")
     for name in ("samples", "seed"):
-        if getattr(table, name) < 0:
-            raise InputError(
-                "must not be negative", field=f"search.{name}", value=getattr(table, name), remedy="leave it out"
-            )
+        if (value := getattr(table, name)) < 0:
+            raise InputError("must not be negative", field=f"search.{name}", value=value, remedy="leave it out")
     at_most(table.samples, DESIGNS, "search.samples", "too many designs")
     if table.difference is not None and table.difference > 0.1:
         raise InputError(

@@ -216,7 +216,9 @@ class SensitivityStudy(WholeStudy[Sensitivities]):
     def _run(self, on_progress: OnProgress | None) -> Sensitivities:
         setting, values = self.setting, _values(self.setting, self.at)
         sizes = [_size(parameter, value) for parameter, value in zip(self.parameters, values, strict=True)]
-        rows, found, began = [], [], time.perf_counter()
+        rows: list[tuple[str, str]] = []
+        found: list[ModeGradients] = []
+        began = time.perf_counter()
         for number, path in enumerate(setting.paths):
             if on_progress is not None:
                 spent = time.perf_counter() - began
@@ -224,7 +226,23 @@ class SensitivityStudy(WholeStudy[Sensitivities]):
             for each in mode_gradients(setting, Task(number, 0, values, path), sizes):
                 rows.append((path, each.mode))
                 found.append(each)
-        return _gathered(self, values, rows, found)
+        columns = tuple(found[0].gradients)
+        return Sensitivities(
+            name=self.name,
+            mechanism=setting.source,
+            rows=tuple(rows),
+            parameters=setting.names,
+            nominal=np.array(values),
+            fields=tuple(parameter.fields for parameter in self.parameters),
+            metrics=columns,
+            units=tuple(metric_of(name).unit for name in columns),
+            values=np.array([[each.values[name] for name in columns] for each in found]),
+            derivatives=np.array([[each.gradients[name] for name in columns] for each in found]),
+            errors=np.array([[each.errors[name] for name in columns] for each in found]),
+            residual=np.array([each.residual for each in found]),
+            content=self.content(),
+            verdict=setting.verdict(),
+        )
 
 
 @checked_arguments()
@@ -245,7 +263,9 @@ def load_sensitivities(file: str | Path, metrics: Sequence[str] = ()) -> Sensiti
     """
     with study_table(SweepTable, file) as (table, folder):
         chosen = list(metrics) or table.metrics
-        _check_names(chosen)
+        for name in chosen:
+            check_metric(name, known=SMOOTH)
+        check_smooth(chosen)
         setting, parameters, _ = make_setting(table.model_copy(update={"metrics": chosen}), folder)
         check_has_path(setting)
         if not chosen:
@@ -275,12 +295,6 @@ def sensitivities(study: SensitivityStudy | str | Path, *, at: Mapping[str, floa
     return (study if at is None else replace(study, at=at)).run()
 
 
-def _check_names(names: Sequence[str]) -> None:
-    for name in names:
-        check_metric(name, known=SMOOTH)
-    check_smooth(tuple(names))
-
-
 def _values(setting: Setting, at: Mapping[str, float]) -> tuple[float, ...]:
     for name, value in at.items():
         known(name, setting.names, "--at", "parameter")
@@ -297,25 +311,3 @@ def _size(parameter: SweptParameter, value: float) -> float | None:
     if value != 0.0 or parameter.low is None or parameter.high is None:
         return None
     return parameter.high - parameter.low
-
-
-def _gathered(
-    study: SensitivityStudy, values: tuple[float, ...], rows: list[tuple[str, str]], found: list[ModeGradients]
-) -> Sensitivities:
-    columns = tuple(found[0].gradients)
-    return Sensitivities(
-        name=study.name,
-        mechanism=study.setting.source,
-        rows=tuple(rows),
-        parameters=study.setting.names,
-        nominal=np.array(values),
-        fields=tuple(parameter.fields for parameter in study.parameters),
-        metrics=columns,
-        units=tuple(metric_of(name).unit for name in columns),
-        values=np.array([[each.values[name] for name in columns] for each in found]),
-        derivatives=np.array([[each.gradients[name] for name in columns] for each in found]),
-        errors=np.array([[each.errors[name] for name in columns] for each in found]),
-        residual=np.array([each.residual for each in found]),
-        content=study.content(),
-        verdict=study.setting.verdict(),
-    )
