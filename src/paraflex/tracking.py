@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from enum import Enum
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 
@@ -136,11 +136,11 @@ class TrackingTask:
         """
         mechanism, desired = self.mechanism, self.motion.desired
         names = [motor.name for motor in mechanism.motors]
-        desired_position = desired.position if actual is None else desired.position[: len(actual)]
+        actual = desired.position if actual is None else actual
         return Driven(
             mode=mode,
-            desired=desired_position,
-            actual=desired_position if actual is None else actual,
+            desired=desired.position[: len(actual)],
+            actual=actual,
             acceleration=float(np.max(np.linalg.norm(desired.acceleration, axis=1))),
             peaks=dict(zip(names, np.max(np.abs(torques), axis=0).tolist(), strict=True)),
             units=dict(zip(names, mechanism.motor_units(), strict=True)),
@@ -410,18 +410,18 @@ def simulate(
     if after is not None:
         task = replace(task, after=after)
     options = choose(method, options)
-    title = options.method.title
     torques = task.torques(mode)
-    condition = actuation_condition(task.effort, torques.mode)
+    run_of = partial(
+        TrackingRun, task, torques, actuation_condition(task.effort, torques.mode), method=options.method.title
+    )
     try:
         if task.holds:
-            run = _drive_and_hold(task, torques, condition, options, on_progress)
+            run = _drive_and_hold(task, torques, run_of, options, on_progress)
         else:
-            solution = _drive(task, torques, task.motion.t, options, on_progress)
-            run = TrackingRun(task, torques, condition, solution, title)
+            run = run_of(_drive(task, torques, task.motion.t, options, on_progress))
     except IntegrationError as error:
         if not isinstance(error.partial, TrackingRun):
-            error.partial = TrackingRun(task, torques, condition, error.partial, title)
+            error.partial = run_of(error.partial)
         raise
     if warning:
         run.warn()
@@ -463,7 +463,7 @@ def _drive(
 def _drive_and_hold(
     task: TrackingTask,
     torques: FeedForward,
-    condition: Array,
+    run_of: Callable[..., TrackingRun],
     options: IntegrationOptions,
     on_progress: Callable[[float], None] | None,
 ) -> TrackingRun:
@@ -474,9 +474,8 @@ def _drive_and_hold(
     if count == 0 or until[-1] < end * (1.0 - _SAME_TIME):
         until = np.append(until, end)
     driven = _drive(task, torques, until, options, on_progress)
-    title = options.method.title
     if driven.status != "complete":
-        return TrackingRun(task, torques, condition, driven, title)
+        return run_of(driven)
     motors = [motor for motor in task.mechanism.motors if motor.name in torques.mode.motors]
     braked = brake(task.system, State(float(until[-1]), driven.q[-1], driven.v[-1]), [motor.joint for motor in motors])
     signals, knots = still_signals(braked.system.mechanism, float(times[-1]))
@@ -489,7 +488,7 @@ def _drive_and_hold(
         holding[:, columns] = braked.holding(held.multipliers)
         # The state at an event is one sample more than the times of the task.
         holding = np.concatenate([torques.evaluate(driven.t[:count]), holding[: held.t.size - bool(held.event)]])
-        return TrackingRun(task, torques, condition, solution, title, holding=holding)
+        return run_of(solution, holding=holding)
 
     try:
         held = integrate(
@@ -508,8 +507,8 @@ def _start(system: System, motion: RigidMotion) -> State:
     return State(float(motion.t[0]), q, v)
 
 
-def undeformed_at(system: System, motion: RigidMotion, sample: int) -> tuple[Array, Array, Array]:
-    """Return coordinates (n,) and their two derivatives at a sample of a rigid motion, bodies undeformed."""
+def undeformed_at(system: System, motion: RigidMotion, sample: int | list[int]) -> tuple[Array, Array, Array]:
+    """Return coordinates (n,), or (k, n), and two derivatives at samples of a rigid motion, bodies undeformed."""
     return undeformed_motion(system, motion.system, motion.q[sample], motion.v[sample], motion.a[sample])
 
 

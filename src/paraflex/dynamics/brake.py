@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from paraflex.arrays import Array
-from paraflex.dynamics.joint_coordinates import joint_coordinate
+from paraflex.dynamics.joint_coordinates import joint_value
 from paraflex.dynamics.signals import moment_signals
 from paraflex.dynamics.sparse import sparse_mass
 from paraflex.dynamics.state import State, project_velocity
@@ -70,9 +70,9 @@ def brake(system: System, state: State, joints: Sequence[str]) -> BrakedSystem:
     """
     mechanism = system.mechanism
     names = [f"brake of {joint}" for joint in joints]
-    values = [float(joint_coordinate(system, joint, state.q[None]).value[0]) for joint in joints]
     locks = tuple(
-        PrescribedAngle(name, joint, HeldAngle(value)) for name, joint, value in zip(names, joints, values, strict=True)
+        PrescribedAngle(name, joint, HeldAngle(joint_value(system, joint, state.q)))
+        for name, joint in zip(names, joints, strict=True)
     )
     locked = build_system(replace(mechanism, prescribed=(*mechanism.prescribed, *locks)), system)
     v = project_velocity(locked, moment_signals(locked.mechanism, state.time), state.time, state.q, state.v)

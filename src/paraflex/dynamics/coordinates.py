@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
-from paraflex.arrays import Array
+from paraflex.arrays import Array, Numbers
 from paraflex.dynamics.shapes import BodyShape, PointShape, beam_lumps, body_shape
 from paraflex.errors import InputError
 from paraflex.fem import (
@@ -19,7 +20,6 @@ from paraflex.fem import (
     modal_basis,
     node_weights,
 )
-from paraflex.fem.element import transverse_shape
 from paraflex.mechanism import Body, FlexibleBeam, Geometry, Mechanism, PointRef, RigidBody
 
 GROUND_INDEX = -1
@@ -61,6 +61,18 @@ class BodyCoordinates:
     def mesh(self) -> BeamMesh | None:
         """Mesh of a flexible beam; None for any other body."""
         return self.shape.mesh
+
+    @property
+    def mass_matrix(self) -> Numbers:
+        """Mass matrix (3 + nf, 3 + nf) of the undeformed body in its frame; modes have unit mass."""
+        mass = self.integrals.mass_matrix
+        mass[3:, 3:] = np.eye(self.nf)
+        return mass
+
+    @property
+    def stiffness(self) -> Numbers:
+        """Elastic stiffness (3 + nf,) of each coordinate: omega^2 for modal ones, zero for rigid ones."""
+        return np.concatenate([np.zeros(3), self.modes.omega**2])
 
     @property
     def nf(self) -> int:
@@ -173,11 +185,7 @@ def _check_mass(name: str, body: ShapeIntegrals) -> None:
 
     It is not if the inertia about its centre of mass is rounding against the inertia about its origin.
     """
-    rigid = [[body.m, 0.0, -body.S1[1]], [0.0, body.m, body.S1[0]], [-body.S1[1], body.S1[0], body.I0 + body.J]]
-    mass = np.real(np.array(rigid))
-    if body.nf:
-        coupling = np.real(np.vstack([body.S2, body.G1 + body.Jf]))
-        mass = np.block([[mass, coupling], [coupling.T, np.real(body.Mff)]])
+    mass = np.real(body.mass_matrix)
     if np.all(np.isfinite(mass)) and np.all(np.diag(mass) > 0.0):
         size = np.sqrt(np.diag(mass))
         if np.linalg.eigvalsh(mass / size / size[:, None])[0] > _SINGULAR:
@@ -193,17 +201,36 @@ def _not_definite(name: str) -> InputError:
     )  # fmt: skip
 
 
-def make_marker(
-    mechanism: Mechanism, bodies: tuple[BodyCoordinates, ...], index: dict[str, int], ref: PointRef
-) -> Marker:
-    """Return the material point of a name; for the ground, a fixed position without a body."""
-    if ref.on_ground:
-        return Marker(GROUND_INDEX, np.array(mechanism.ground[ref.point]) * 1.0, np.zeros((2, 0)), np.zeros(0))
-    i = index[ref.body]
-    body = bodies[i]
-    if body.mesh is None:
-        return _point_marker(i, body, body.shape.points[ref.point])
-    return node_marker(i, body, body.mesh.points[ref.point])
+@dataclass(frozen=True)
+class PlacedBodies:
+    """A mechanism, and the coordinates of its bodies.
+
+    Attributes
+    ----------
+    mechanism : Mechanism
+        Mechanism in the frames of its parts, with actuators included.
+    bodies : tuple of BodyCoordinates
+        Coordinates of each body.
+    """
+
+    mechanism: Mechanism
+    bodies: tuple[BodyCoordinates, ...]
+
+    @cached_property
+    def index(self) -> dict[str, int]:
+        """Index of each body by name."""
+        return {body.name: i for i, body in enumerate(self.bodies)}
+
+    def marker(self, ref: PointRef) -> Marker:
+        """Return the material point of a name; for the ground, a fixed position without a body."""
+        if ref.on_ground:
+            place = np.array(self.mechanism.ground[ref.point]) * 1.0
+            return Marker(GROUND_INDEX, place, np.zeros((2, 0)), np.zeros(0))
+        i = self.index[ref.body]
+        body = self.bodies[i]
+        if body.mesh is None:
+            return _point_marker(i, body, body.shape.points[ref.point])
+        return node_marker(i, body, body.mesh.points[ref.point])
 
 
 def end_markers(index: int, body: BodyCoordinates) -> tuple[Marker, ...]:
@@ -237,8 +264,7 @@ def transverse_pieces(body: BodyCoordinates) -> Array:
     # Six values determine a quintic.
     z, pieces = np.linspace(0.0, 1.0, 6), []
     for e, length in enumerate(np.diff(mesh.nodes)):
-        rows = mesh.scatter(e, transverse_shape(z * length, length))
-        powers = np.linalg.solve(np.vander(z, increasing=True), rows)
+        powers = np.linalg.solve(np.vander(z, increasing=True), mesh.transverse_rows(e, z * length))
         pieces.append(powers / (length ** np.arange(6))[:, None] @ body.integrals.D)
     return np.array(pieces)
 

@@ -15,7 +15,7 @@ from paraflex.dynamics.projection import assemble, closed, constraint_change
 from paraflex.dynamics.rank import DENSE_ROWS
 from paraflex.dynamics.system import System
 from paraflex.errors import AssemblyError, Moment
-from paraflex.kernel.packed import CONSTRAINT, Signals
+from paraflex.kernel.packed import Signals
 from paraflex.mechanism import PrescribedAngle
 
 # Weight of stiffness in `link_metric` when loops are closed: links move, their deflections stay as given.
@@ -169,11 +169,10 @@ def _follow(system: System, signals: Signals, t: float, q: Array) -> tuple[Array
 
 def _side(system: System, q: Array) -> float:
     """Return the sign of det Phi_q of a fully driven rigid mechanism, which changes where branches meet; else zero."""
-    rows = system.packed.rows["kind"] == CONSTRAINT
     rigid = [body.offset + k for body in system.bodies for k in range(3)]
-    if np.sum(rows) != len(rigid) or len(rigid) > DENSE_ROWS:
+    if system.n_constraints != len(rigid) or len(rigid) > DENSE_ROWS:
         return 0.0
-    return float(np.linalg.slogdet(system.jacobian(q)[np.ix_(rows, rigid)])[0])
+    return float(np.linalg.slogdet(system.jacobian(q)[np.ix_(system.constrained, rigid)])[0])
 
 
 def _sharpened(system: System, q: Array) -> Array:
@@ -181,8 +180,8 @@ def _sharpened(system: System, q: Array) -> Array:
 
     The gap of the loops is quadratic along the direction in which they hardly open; the least singular value is linear.
     """
-    rows = system.packed.rows["kind"] == CONSTRAINT
-    if not 0 < np.sum(rows) <= min(DENSE_ROWS, system.n):
+    rows = system.constrained
+    if not 0 < system.n_constraints <= min(DENSE_ROWS, system.n):
         return q
 
     def jacobian(q: Array) -> Array:

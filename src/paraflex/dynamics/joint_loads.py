@@ -17,7 +17,7 @@ from paraflex.arrays import Array
 from paraflex.dynamics.constraints import RowTerm, Term
 from paraflex.dynamics.coordinates import transverse_pieces, transverse_rows
 from paraflex.dynamics.following import driven_rows
-from paraflex.dynamics.joint_coordinates import axis_angle, line_direction
+from paraflex.dynamics.joint_coordinates import axis_angle, line_direction, unit_vectors
 from paraflex.dynamics.points import marker_place, point_motion
 from paraflex.dynamics.rank import NO_PART, dependence
 from paraflex.dynamics.system import System
@@ -114,7 +114,7 @@ def load_in(
             force -= load * _direction(system, term, q)
     for torque in torques[:, list(parts.motors)].T:
         if joint.slides:
-            force += torque[:, None] * _unit(axis_angle(system, joint, q))
+            force += torque[:, None] * unit_vectors(axis_angle(system, joint, q))
         else:
             moment += torque
     return force, moment
@@ -255,10 +255,10 @@ def _direction(system: System, term: Term, q: Array) -> Array:
     if term.carrier == "nothing":
         return line_direction(system, joint, q)
     along = axis_angle(system, joint, q)
-    direction = _unit(along + term.direction - joint.direction)
+    direction = unit_vectors(along + term.direction - joint.direction)
     if term.carrier == "track":
         # Normal to the deformed beam at the position of the point.
-        direction = direction - _track_slope(system, joint, q)[:, None] * _unit(along)
+        direction = direction - _track_slope(system, joint, q)[:, None] * unit_vectors(along)
     return direction
 
 
@@ -267,10 +267,6 @@ def _track_slope(system: System, joint: Joint, q: Array) -> Array:
     body = system.body(joint.a.body)
     assert body.mesh is not None
     away = marker_place(system, system.marker(joint.b), q)[0] - q[:, body.position]
-    x = np.sum(away * _unit(q[:, body.angle]), axis=1)
+    x = np.sum(away * unit_vectors(q[:, body.angle]), axis=1)
     shapes = transverse_rows(body.mesh.nodes, transverse_pieces(body), x, 1)
     return np.sum(shapes * q[:, body.flexible], axis=1)
-
-
-def _unit(angle: Array) -> Array:
-    return np.column_stack([np.cos(angle), np.sin(angle)])

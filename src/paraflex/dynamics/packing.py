@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from paraflex.arrays import Array
 from paraflex.dynamics.constraints import Constraint, Term, coordinate
-from paraflex.dynamics.coordinates import BodyCoordinates, Marker, make_marker, transverse_pieces
+from paraflex.dynamics.coordinates import BodyCoordinates, Marker, PlacedBodies, transverse_pieces
 from paraflex.dynamics.inputs import inputs_of
 from paraflex.dynamics.scale import mechanism_size
 from paraflex.kernel.packed import (
@@ -37,12 +37,10 @@ from paraflex.mechanism import Joint, Mechanism, PointRef, TimeProfile
 _OF_SPRINGS = ("stiffness", "length", "damping")
 
 
-def pack_system(
-    mechanism: Mechanism, bodies: tuple[BodyCoordinates, ...], index: dict[str, int], constraints: list[Constraint]
-) -> tuple[PackedSystem, tuple[str, ...]]:
+def pack_system(placed: PlacedBodies, constraints: list[Constraint]) -> tuple[PackedSystem, tuple[str, ...]]:
     """Return the records and arrays for the kernels, and the name of every constraint row."""
-    size = mechanism_size(bodies)
-    packer = _Packer(mechanism, bodies, index, size)
+    mechanism, bodies = placed.mechanism, placed.bodies
+    packer = _Packer(placed)
     for constraint in constraints:
         packer.add_constraint(constraint)
     for k, motor in zip(inputs_of(mechanism).motors, mechanism.motors, strict=True):
@@ -84,7 +82,7 @@ def pack_system(
         spans=_flat([_padded(p.weights.T) for p in points]),
         inertias=_flat([_padded(np.stack([p.x, p.mass, p.inertia])) for p in points]),
         total_mass=np.sum([body.integrals.m for body in bodies]).item(),
-        size=size,
+        size=packer.size,
         gravity=np.array(mechanism.gravity) * 1.0,
     )
     return packed, tuple(packer.labels)
@@ -93,26 +91,25 @@ def pack_system(
 class _Packer:
     """Builder of a system's records, joint by joint."""
 
-    def __init__(
-        self, mechanism: Mechanism, bodies: tuple[BodyCoordinates, ...], index: dict[str, int], size: float
-    ) -> None:
-        self.mechanism, self.bodies, self.index, self.size = mechanism, bodies, index, size
+    def __init__(self, placed: PlacedBodies) -> None:
+        self.placed, self.size = placed, mechanism_size(placed.bodies)
+        self.ground, self.index = placed.mechanism.ground, placed.index
         self.markers: list[Marker] = []
-        self.ports: list[list[dict]] = [[] for _ in bodies]
-        self.motor_sides: list[list[dict]] = [[] for _ in bodies]
+        self.ports: list[list[dict]] = [[] for _ in placed.bodies]
+        self.motor_sides: list[list[dict]] = [[] for _ in placed.bodies]
         self.axes: list[dict] = []
         self.tracks: list[int] = []
         self.rows: list[dict] = []
         self.labels: list[str] = []
 
     def add_marker(self, ref: PointRef) -> int:
-        self.markers.append(make_marker(self.mechanism, self.bodies, self.index, ref))
+        self.markers.append(self.placed.marker(ref))
         return len(self.markers) - 1
 
     def end(self, ref: PointRef, end: str) -> dict[str, float]:
         """Return one end of a line or an axis: a marker, or a position on the ground."""
         if ref.on_ground:
-            x, y = self.mechanism.ground[ref.point]
+            x, y = self.ground[ref.point]
             return {end: -1, f"{end}x": x, f"{end}y": y}
         return {end: self.add_marker(ref), f"{end}x": 0.0, f"{end}y": 0.0}
 
@@ -140,7 +137,7 @@ class _Packer:
             if ref.on_ground:
                 if term.kind == POINT:
                     for coordinate in range(2):
-                        self.rows[row + coordinate]["ground"] += weight * self.mechanism.ground[ref.point][coordinate]
+                        self.rows[row + coordinate]["ground"] += weight * self.ground[ref.point][coordinate]
                 continue
             if axis < 0:
                 marker, parts = self.add_marker(ref), rows

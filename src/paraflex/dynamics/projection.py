@@ -18,7 +18,7 @@ from paraflex.dynamics.rank import DENSE_ROWS, Dependence, constraint_jacobian, 
 from paraflex.dynamics.sparse import Saddle, elastic_stiffness, sparse_mass
 from paraflex.dynamics.system import System
 from paraflex.errors import InconsistentConstraintsError, Moment
-from paraflex.kernel.packed import CONSTRAINT, INDEX_1, Signals
+from paraflex.kernel.packed import INDEX_1, Signals
 from paraflex.kernel.stage import equations
 
 Sparse = scipy.sparse.csr_matrix
@@ -179,7 +179,7 @@ def second_rates(system: System, signals: Signals, t: float, q: Array, v: Array,
     """Return Phi'' (m,) at accelerations (n,); zero in the rows of springs and dampers."""
     workspace, torques = system.workspace(), np.zeros(inputs_of(system.mechanism).acting)
     equations(system.packed, signals, t, INDEX_1, q, v, a, np.zeros(system.m), torques, workspace)
-    return np.where(system.packed.rows["kind"] == CONSTRAINT, workspace.rows, 0.0)
+    return np.where(system.constrained, workspace.rows, 0.0)
 
 
 def joint_gaps(system: System, phi: Array) -> dict[str, float]:

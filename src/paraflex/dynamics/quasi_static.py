@@ -11,7 +11,7 @@ import numpy as np
 
 from paraflex.arrays import Array
 from paraflex.dynamics.equilibrium import largest_move, moving_equilibrium, static_equilibrium
-from paraflex.dynamics.joint_coordinates import joint_coordinate
+from paraflex.dynamics.joint_coordinates import joint_coordinate, joint_value
 from paraflex.dynamics.projection import LeastChange, constraint_change, project, second_rates
 from paraflex.dynamics.rank import dependence
 from paraflex.dynamics.signals import moment_signals
@@ -154,9 +154,8 @@ def _driven(system: System, start: State, driven: Mapping[str, JointMotion]) -> 
         replace(prescribed, profile=_smooth(prescribed.profile, start.time))
         for prescribed in system.mechanism.prescribed
     )
-    values = {name: float(joint_coordinate(system, name, start.q[None]).value[0]) for name in driven}
     more = tuple(
-        PrescribedAngle(f"drive of {name}", name, DrivenAngle(start.time, values[name], motion))
+        PrescribedAngle(f"drive of {name}", name, DrivenAngle(start.time, joint_value(system, name, start.q), motion))
         for name, motion in driven.items()
     )
     loads = tuple(_smooth_load(load, start.time) for load in system.mechanism.loads)

@@ -12,7 +12,6 @@ from paraflex.arrays import Array
 from paraflex.dynamics.sparse import body_masses, sparse_jacobian
 from paraflex.dynamics.system import System
 from paraflex.kernel.linear import factor_system
-from paraflex.kernel.packed import CONSTRAINT
 
 # A constraint row with an independent part smaller than this fraction of the largest is redundant.
 DEPENDENT = 1e-9
@@ -93,7 +92,7 @@ def dependence(
     acting : (c,) array, optional
         Constraint rows that are considered; all by default.
     """
-    rigid = np.nonzero(system.packed.rows["kind"] == CONSTRAINT)[0] if acting is None else acting
+    rigid = np.nonzero(system.constrained)[0] if acting is None else acting
     if rigid.size == 0:
         return Dependence(rigid, rigid, np.zeros((0, 0)))
     if rigid.size <= DENSE_ROWS or acting is not None:

@@ -64,10 +64,7 @@ def sparse_mass(system: System, q: Array) -> scipy.sparse.csr_matrix:
 
 def stiffness_diagonal(system: System) -> Array:
     """Return the elastic stiffness (n,) of each coordinate: omega^2 for modal ones, zero for rigid ones."""
-    diagonal = np.zeros(system.n)
-    for body in system.bodies:
-        diagonal[body.flexible] = body.modes.omega**2
-    return diagonal
+    return np.concatenate([body.stiffness for body in system.bodies])
 
 
 def elastic_stiffness(system: System, q: Array, *, every_spring: bool = False) -> scipy.sparse.csr_matrix:

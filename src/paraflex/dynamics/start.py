@@ -15,7 +15,7 @@ from paraflex.arrays import Array
 from paraflex.dynamics.change_points import change_point_at
 from paraflex.dynamics.coordinates import BodyCoordinates, end_markers
 from paraflex.dynamics.following import POSITION_STIFFNESS, follow_drives
-from paraflex.dynamics.joint_coordinates import joint_coordinate
+from paraflex.dynamics.joint_coordinates import joint_value
 from paraflex.dynamics.points import marker_place
 from paraflex.dynamics.projection import assemble, constraint_change, least_change, link_metric, project
 from paraflex.dynamics.rank import constraint_jacobian
@@ -108,8 +108,8 @@ def standing_system(mechanism: Mechanism, start: Start | State | str | None, ass
         start, assembly = None, start
     if not isinstance(start, State):
         return build_system(standing(mechanism, assembly, start))
-    system, q = build_system(mechanism), start.q[None]
-    begun = begun_at(mechanism, lambda joint: float(joint_coordinate(system, joint, q).value[0]), start.time)
+    system, q = build_system(mechanism), start.q
+    begun = begun_at(mechanism, lambda joint: joint_value(system, joint, q), start.time)
     return system if begun is mechanism else build_system(begun)
 
 

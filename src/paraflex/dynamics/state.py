@@ -79,19 +79,19 @@ def undeformed(system: System, rigid: System, state: State) -> State:
 
 
 def undeformed_motion(system: System, rigid: System, q: Array, v: Array, a: Array) -> tuple[Array, Array, Array]:
-    """Return coordinates (n,) and their derivatives of undeformed bodies that move as the rigid ones.
+    """Return coordinates (..., n) and their derivatives of undeformed bodies that move as the rigid ones.
 
     Parts of a divided beam are at their positions along it.
     """
-    there = np.zeros((3, system.n))
+    there = np.zeros((3, *q.shape[:-1], system.n))
     for body in system.bodies:
         name, along = system.carrier(body.name)
-        (x, y, phi), (vx, vy, w), (ax, ay, dw) = (part[rigid.body(name).all] for part in (q, v, a))
+        (x, y, phi), (vx, vy, w), (ax, ay, dw) = (part.T[rigid.body(name).all] for part in (q, v, a))
         c, s = along * np.cos(phi), along * np.sin(phi)
         own = slice(body.offset, body.offset + 3)
-        there[0, own] = x + c, y + s, phi
-        there[1, own] = vx - w * s, vy + w * c, w
-        there[2, own] = ax - dw * s - w * w * c, ay + dw * c - w * w * s, dw
+        there[0].T[own] = x + c, y + s, phi
+        there[1].T[own] = vx - w * s, vy + w * c, w
+        there[2].T[own] = ax - dw * s - w * w * c, ay + dw * c - w * w * s, dw
     return there[0], there[1], there[2]
 
 

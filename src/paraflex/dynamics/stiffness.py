@@ -21,12 +21,12 @@ from paraflex.kernel.stage import equations
 class RestingForces:
     """Forces at rest (n,), signed as on the left-hand side of the equations, and rows of springs (m,).
 
-    The stiffness of beams is not included: it is a diagonal matrix and would dominate all other forces. With velocities
-    `v` and accelerations `a` (n,) other than zero the forces are those of a motion.
+    The stiffness of beams is not included by default: it is a diagonal matrix and would dominate all other forces. With
+    velocities `v` and accelerations `a` (n,) other than zero the forces are those of a motion.
     """
 
-    def __init__(self, system: System, time: float) -> None:
-        self.packed: PackedSystem = without_stiffness(system.packed)
+    def __init__(self, system: System, time: float, *, beams: bool = False) -> None:
+        self.packed: PackedSystem = system.packed if beams else without_stiffness(system.packed)
         self.time = time
         self.signals: Signals = moment_signals(system.mechanism, time)
         self.workspace: Workspace = system.workspace()
@@ -48,8 +48,7 @@ class RestingForces:
         scale = np.where(rows["kind"] == FRICTION, 1.0, rows["compliance"])
         self.workspace.compliance[:] = scale
         self._evaluate(q, np.zeros(rows.size))
-        compliant = rows["kind"] != CONSTRAINT
-        return np.divide(self.workspace.rows, scale, out=np.zeros(rows.size), where=compliant)
+        return np.divide(self.workspace.rows, scale, out=np.zeros(rows.size), where=rows["kind"] != CONSTRAINT)
 
     def _evaluate(self, q: Array, lam: Array) -> None:
         equations(

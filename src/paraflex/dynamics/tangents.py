@@ -24,7 +24,7 @@ from paraflex.arrays import Array
 from paraflex.dynamics.inputs import inputs_of
 from paraflex.dynamics.sparse import apart_colours, bodies_acted_on, tied_bodies
 from paraflex.dynamics.system import System
-from paraflex.kernel.packed import CONSTRAINT, FRICTION, INDEX_1, SPRING
+from paraflex.kernel.packed import FRICTION, INDEX_1, SPRING
 from paraflex.kernel.tangent import make_tangent, note_slopes
 from paraflex.kernel.tangent_columns import ACCELERATION, COORDINATE, VELOCITY, tangent_columns
 
@@ -186,13 +186,13 @@ class Tangency:
         damping, second_rate = self._columns(point, INDEX_1, VELOCITY)
         stiffness, second_place = self._columns(point, INDEX_1, COORDINATE)
         rate = self._columns(point, _RATES, COORDINATE)[1] if np.any(point.v) else 0.0 * second_place
-        kinds = self.system.packed.rows["kind"]
-        rows, compliant = np.nonzero(kinds == CONSTRAINT)[0], np.nonzero(kinds != CONSTRAINT)[0]
+        rows, compliant = np.nonzero(self.system.constrained)[0], np.nonzero(~self.system.constrained)[0]
         held = rows_of(rows, jacobian, rate, second_place, second_rate)
         place, speed = rows_of(compliant, second_place, second_rate)
         if compliant.size:
             # Directions in which their torques act: the derivatives of angles and travels.
-            springs = scipy.sparse.diags((kinds[compliant] == SPRING).astype(float))
+            kinds = self.system.packed.rows["kind"][compliant]
+            springs = scipy.sparse.diags((kinds == SPRING).astype(float))
             turns = csr_matrix(springs @ place + (scipy.sparse.identity(compliant.size) - springs) @ speed).T
             strength = scipy.sparse.diags(self._strengths(point)[compliant])
             place, speed = csr_matrix(strength @ place), csr_matrix(strength @ speed)

@@ -29,7 +29,6 @@ from paraflex.dynamics.sparse import Saddle, stiffness_diagonal, without_stiffne
 from paraflex.dynamics.stiffness import RestingForces
 from paraflex.dynamics.tangents import MotionPoint, Tangency, rows_of
 from paraflex.equilibria.conditions import Conditions, Coordinate
-from paraflex.kernel.packed import CONSTRAINT
 from paraflex.linear.coordinates import Coordinates, unit_in, with_coordinates
 from paraflex.linear.independent import independent_dense, independent_sparse
 from paraflex.mechanism import PointRef
@@ -120,7 +119,7 @@ class Equations:
     @cached_property
     def holding(self) -> NDArray[np.int64]:
         """Rows that keep their value or follow a change: constraints, and coordinates held or moved."""
-        own = [k for k in self.own.tolist() if self.extended.packed.rows["kind"][k] == CONSTRAINT]
+        own = [k for k in self.own.tolist() if self.extended.constrained[k]]
         extra = [self.number[one] for one in (*self.conditions.held, *self.conditions.moved)]
         return np.array(list(dict.fromkeys([*own, *extra])), dtype=int)
 
