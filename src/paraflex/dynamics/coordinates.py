@@ -168,37 +168,38 @@ def body_coordinates(body: Body, geometry: Geometry, like: ModalBasis | None = N
         if not isinstance(body, RigidBody) and not body.flexible:
             integrals = integrals.without_flexibility()
         modes = modal_basis(integrals)
+        if like is not None:
+            modes = modes.like(like, integrals.Mff)
+        integrals = integrals.in_basis(modes.vectors)
+        _check_mass(integrals)
     except np.linalg.LinAlgError as error:
-        raise _not_definite(body.name) from error
-    if like is not None:
-        modes = modes.like(like, integrals.Mff)
-    integrals = integrals.in_basis(modes.vectors)
-    _check_mass(body.name, integrals)
+        raise InputError(
+            "its mass matrix is not positive definite, or only by rounding", field=f"body.{body.name}",
+            remedy="check inertia, centre of mass, section, material and lumped masses for values many orders of "
+            "magnitude apart",
+        ) from error  # fmt: skip
     points = None
     if geometry is Geometry.SECOND_ORDER and integrals.nf and isinstance(body, FlexibleBeam):
         points = mass_points(body.mesh, body.spans, beam_lumps(body), integrals.D)
     return BodyCoordinates(body.name, 0, integrals, modes, shape, points, np.zeros((integrals.nf, integrals.nf)))
 
 
-def _check_mass(name: str, body: ShapeIntegrals) -> None:
+def _check_mass(body: ShapeIntegrals) -> None:
     """Check that the mass matrix of a whole undeformed body is positive definite beyond rounding.
 
     It is not if the inertia about its centre of mass is rounding against the inertia about its origin.
+
+    Raises
+    ------
+    numpy.linalg.LinAlgError
+        It is not.
     """
     mass = np.real(body.mass_matrix)
     if np.all(np.isfinite(mass)) and np.all(np.diag(mass) > 0.0):
         size = np.sqrt(np.diag(mass))
         if np.linalg.eigvalsh(mass / size / size[:, None])[0] > _SINGULAR:
             return
-    raise _not_definite(name)
-
-
-def _not_definite(name: str) -> InputError:
-    return InputError(
-        "its mass matrix is not positive definite, or only by rounding", field=f"body.{name}",
-        remedy="check inertia, centre of mass, section, material and lumped masses for values many orders of "
-        "magnitude apart",
-    )  # fmt: skip
+    raise np.linalg.LinAlgError("not positive definite")
 
 
 @dataclass(frozen=True)

@@ -16,9 +16,8 @@ import scipy
 
 from paraflex.arguments import checked_arguments
 from paraflex.arrays import Array
-from paraflex.dynamics.joint_coordinates import joint_coordinate
 from paraflex.dynamics.rank import dependence
-from paraflex.dynamics.sparse import Saddle, sparse_jacobian, sparse_mass, stiffness_diagonal
+from paraflex.dynamics.sparse import Saddle, sparse_jacobian, sparse_joint_rows, sparse_mass, stiffness_diagonal
 from paraflex.dynamics.state import State
 from paraflex.dynamics.stiffness import RestingForces, pose_stiffness
 from paraflex.dynamics.system import System
@@ -103,10 +102,10 @@ def natural_frequencies(
         Number of the lowest vibrations; all by default, or ten for more than 600 coordinates.
     """
     M, J = sparse_mass(system, state.q), sparse_jacobian(system, state.q)
-    efforts = _joint_rows(system, state.q, [*held, *torque_at])
+    efforts = sparse_joint_rows(system, dict.fromkeys([*held, *torque_at]), state.q)
     lam, _, acceleration = forces_at_rest(system, state, Inertia(M, J, efforts))
     elastic, other = stiffness_diagonal(system), pose_stiffness(system, state.time, state.q, lam)
-    C = scipy.sparse.csr_matrix(scipy.sparse.vstack([J, _joint_rows(system, state.q, held)]))
+    C = scipy.sparse.csr_matrix(scipy.sparse.vstack([J, sparse_joint_rows(system, dict.fromkeys(held), state.q)]))
     typical = typical_square(elastic, other, M)
     K = scipy.sparse.csr_matrix(other + scipy.sparse.diags(elastic))
     if system.n <= DENSE_COORDINATES:
@@ -136,12 +135,6 @@ def slowest_deflection(system: System, q: Array) -> float:
     inverse = scipy.linalg.eigvalsh(mass, basis.T @ (elastic[:, None] * basis) + typical * mass) if mass.size else mass
     squares = 1.0 / inverse - typical
     return float(np.sqrt(np.min(squares[squares > _FREE * typical], initial=np.inf)))
-
-
-def _joint_rows(system: System, q: Array, joints: Sequence[str]) -> Sparse:
-    """Return the derivatives (joints, n) of the joints' angles or travels, each once."""
-    rows = [scipy.sparse.csr_matrix(joint_coordinate(system, joint, q[None]).rows) for joint in dict.fromkeys(joints)]
-    return scipy.sparse.csr_matrix(scipy.sparse.vstack([scipy.sparse.csr_matrix((0, system.n)), *rows]))
 
 
 class Inertia(NamedTuple):

@@ -14,7 +14,7 @@ import numpy as np
 
 from paraflex.dynamics.coordinates import BodyCoordinates
 from paraflex.dynamics.system import System
-from paraflex.mechanism import AppliedTorque, Mechanism, PointRef, RigidBody, grouped, joints_named
+from paraflex.mechanism import AppliedTorque, Mechanism, PointRef, grouped, joints_named
 
 # Missing fractions of a rotation below this are not reported.
 _MISSED = 0.05
@@ -48,16 +48,9 @@ def missing_rotations(system: System) -> list[MissingRotation]:
     """
     found: dict[PointRef, MissingRotation] = {}
     for point, cause in _moments(system.mechanism):
-        described = system.mechanism.body(point.body)
         body = system.body(point.body)
-        chosen = body.name in system.mechanism.bases
-        if (
-            isinstance(described, RigidBody)
-            or chosen
-            or not body.nf
-            or body.nf == body.shape.integrals.nf
-            or point in found
-        ):
+        chosen, reduced = body.name in system.mechanism.bases, 0 < body.nf < body.shape.integrals.nf
+        if chosen or not reduced or point in found:
             continue
         part = _missed(body, system, point)
         if part > _MISSED:

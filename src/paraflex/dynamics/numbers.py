@@ -20,11 +20,9 @@ def numbers_of(record: tuple[Any, ...]) -> Array:
 
 def with_numbers(record: R, numbers: Array) -> R:
     """Return the named tuple with other numbers, ordered as by `numbers_of`; integers are unchanged."""
-    fields, at = [], 0
-    for field in record:
-        new, at = _replaced(field, numbers, at)
-        fields.append(new)
-    return type(record)(*fields)
+    ends = np.cumsum([np.size(part) for part in _parts(record)])
+    parts = iter(np.split(numbers, ends))
+    return type(record)(*(_replaced(field, parts) for field in record))
 
 
 def same_layout(a: tuple[Any, ...], b: tuple[Any, ...]) -> bool:
@@ -43,18 +41,17 @@ def _parts(record: tuple[Any, ...]) -> Iterator[Any]:
                 yield field
 
 
-def _replaced(field: Any, numbers: Array, at: int) -> tuple[Any, int]:
+def _replaced(field: Any, parts: Iterator[Array]) -> Any:
     if isinstance(field, float):
-        return float(numbers[at]), at + 1
+        return next(parts).item()
     if not isinstance(field, np.ndarray) or (field.dtype.names is None and field.dtype.kind != "f"):
-        return field, at
+        return field
     if field.dtype.names is None:
-        return numbers[at : at + field.size].reshape(field.shape).copy(), at + field.size
+        return next(parts).reshape(field.shape).copy()
     new = field.copy()
     for name in _floating(field):
-        new[name] = numbers[at : at + field.size]
-        at += field.size
-    return new, at
+        new[name] = next(parts)
+    return new
 
 
 def _same(x: Any, y: Any) -> bool:

@@ -61,12 +61,8 @@ def piecewise_quintic(t: Array, value: Array, rate: Array, acceleration: Array, 
 
 def constant_signals(values: Sequence[float], end: float) -> list[InputSignals]:
     """Return constant signals on [0, end]."""
-    signals = []
-    for value in values:
-        coefficients = np.zeros((1, _DEGREE + 1))
-        coefficients[0, 0] = value
-        signals.append(InputSignals(np.array([0.0, end]), coefficients))
-    return signals
+    breaks = np.array([0.0, end])
+    return [InputSignals(breaks, np.array([[value, 0.0, 0.0, 0.0, 0.0, 0.0]])) for value in values]
 
 
 def no_signals(packed: PackedSystem) -> Signals:

@@ -75,10 +75,15 @@ def elastic_stiffness(system: System, q: Array, *, every_spring: bool = False) -
     mechanism, stiffness = system.mechanism, scipy.sparse.diags(stiffness_diagonal(system))
     springs = [one for one in mechanism.springs if every_spring or is_hinge(mechanism.joint(one.joint))]
     if springs:
-        rows = [scipy.sparse.csr_matrix(joint_coordinate(system, spring.joint, q[None]).rows) for spring in springs]
-        J = scipy.sparse.vstack(rows)
+        J = sparse_joint_rows(system, [spring.joint for spring in springs], q)
         stiffness = stiffness + J.T @ scipy.sparse.diags([spring.stiffness for spring in springs]) @ J
     return scipy.sparse.csr_matrix(stiffness)
+
+
+def sparse_joint_rows(system: System, joints: Iterable[str], q: Array) -> scipy.sparse.csr_matrix:
+    """Return the derivatives (joints, n) of the coordinates of joints."""
+    rows = [scipy.sparse.csr_matrix(joint_coordinate(system, joint, q[None]).rows) for joint in joints]
+    return scipy.sparse.csr_matrix(scipy.sparse.vstack([scipy.sparse.csr_matrix((0, system.n)), *rows]))
 
 
 def sparse_jacobian(system: System, q: Array) -> scipy.sparse.csr_matrix:

@@ -311,10 +311,8 @@ def consistent_state(
     signals = moment_signals(system.mechanism, time)
     q = assembled_position(system, signals, time, q)
     try:
-        if velocity is None:
-            v = project_velocity(system, signals, time, q, np.zeros(system.n), VELOCITY_STIFFNESS)
-        else:
-            v = project_velocity(system, signals, time, q, velocity)
+        wanted, stiffness = (np.zeros(system.n), VELOCITY_STIFFNESS) if velocity is None else (velocity, 0.0)
+        v = project_velocity(system, signals, time, q, wanted, stiffness)
         check_accelerations(system, signals, time, q, v)
     except InconsistentConstraintsError as error:
         target = -system.constraints(signals, time, q)[1]

@@ -103,9 +103,8 @@ class System(PlacedBodies):
         rows = scipy.sparse.lil_matrix((sum(len(body.shape.slopes) for body in self.bodies), self.n))
         first = 0
         for body in self.bodies:
-            last = first + len(body.shape.slopes)
-            rows[first:last, body.flexible] = body.shape.slopes @ body.integrals.D
-            first = last
+            own = slice(first, first := first + len(body.shape.slopes))
+            rows[own, body.flexible] = body.shape.slopes @ body.integrals.D
         return rows.tocsr()
 
     @cached_property
@@ -114,14 +113,9 @@ class System(PlacedBodies):
         return float(np.min(self.row_units, initial=1.0))
 
     @cached_property
-    def lowest(self) -> tuple[float, ...]:
-        """Lowest angular frequency of each flexible body [rad/s]."""
-        return tuple(float(np.min(body.modes.omega)) for body in self.bodies if body.nf)
-
-    @property
     def slowest(self) -> float:
         """Angular frequency of the slowest vibration of a flexible body [rad/s]; 1000 if there is none."""
-        return min(self.lowest, default=_USUAL)
+        return min((float(np.min(body.modes.omega)) for body in self.bodies if body.nf), default=_USUAL)
 
     @cached_property
     def vibrations_die_out(self) -> bool:

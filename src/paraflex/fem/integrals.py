@@ -135,22 +135,10 @@ def rigid_integrals(mass: float, centre: Sequence[float], inertia: float) -> Sha
         Moment of inertia about the centre of mass [kg m^2].
     """
     c = np.array(centre) * 1.0
-    none, nothing = np.zeros(0), np.zeros((0, 0))
-    return ShapeIntegrals(
-        m=mass,
-        S1=mass * c,
-        S2=np.zeros((2, 0)),
-        I0=inertia + mass * (c @ c).item(),
-        I1=none,
-        I2=nothing,
-        G1=none,
-        G2=nothing,
-        J=0.0,
-        Jf=none,
-        Jff=nothing,
-        K=nothing,
-        D=nothing,
-    )
+    rows = dict.fromkeys(("I1", "G1", "Jf"), np.zeros(0))
+    matrices = dict.fromkeys(("I2", "G2", "Jff", "K", "D"), np.zeros((0, 0)))
+    I0 = inertia + mass * (c @ c).item()
+    return ShapeIntegrals(m=mass, S1=mass * c, S2=np.zeros((2, 0)), I0=I0, J=0.0, **rows, **matrices)
 
 
 def beam_integrals(

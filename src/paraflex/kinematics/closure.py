@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -192,7 +193,17 @@ def path_follower(
     PathFollower
         Callable that returns the motion at times (k,), ascending [s].
     """
-    return PathFollower(*_assembled(mechanism, path, end, assembly, orientation), path)
+    if mechanism.end_effector is None:
+        raise InputError("the mechanism has no end-effector", field="end_effector", remedy="name its point")
+    closure = PathClosure(mechanism.rigid(), orientation, end)
+    chosen = assembly if isinstance(assembly, Assembly) else mechanism.assembly(assembly)
+    closure.check_degrees_of_freedom(chosen)
+    if turning_of(path, np.zeros(1)) is not None and "angle" not in mechanism.end_effector.coordinates:
+        raise InputError(
+            "the path gives angles, but the task has none", field="end_effector.coordinates",
+            value=list(mechanism.end_effector.coordinates), remedy='name "angle", or leave the angles out',
+        )  # fmt: skip
+    return PathFollower(closure, closure.assemble(chosen), path)
 
 
 @dataclass(frozen=True)
@@ -225,23 +236,6 @@ class PathFollower:
         return replace(self, path=path)
 
 
-def _assembled(
-    mechanism: Mechanism, path: Path, end: float, assembly: str | Assembly | None, orientation: float
-) -> tuple[PathClosure, Array]:
-    """Return the closure along a path, and the pose of the assembly; errors as in `follow_path`."""
-    if mechanism.end_effector is None:
-        raise InputError("the mechanism has no end-effector", field="end_effector", remedy="name its point")
-    closure = PathClosure(mechanism.rigid(), orientation, end)
-    chosen = assembly if isinstance(assembly, Assembly) else mechanism.assembly(assembly)
-    closure.check_degrees_of_freedom(chosen)
-    if turning_of(path, np.zeros(1)) is not None and "angle" not in mechanism.end_effector.coordinates:
-        raise InputError(
-            "the path gives angles, but the task has none", field="end_effector.coordinates",
-            value=list(mechanism.end_effector.coordinates), remedy='name "angle", or leave the angles out',
-        )  # fmt: skip
-    return closure, closure.assemble(chosen)
-
-
 def reach_shortfall(
     mechanism: Mechanism,
     path: Path,
@@ -269,11 +263,11 @@ def reach_shortfall(
     InputError, AssemblyError
         Same causes as in `follow_path`.
     """
-    closure, pose = _assembled(mechanism, path, path.duration, assembly, orientation)
+    follower = path_follower(mechanism, path, path.duration, assembly=assembly, orientation=orientation)
+    closure, pose = follower.closure, follower.assembled
     if times is None:
         return closure.shortfall(path, 0.0, path.duration, pose)
-    times = np.asarray(times, dtype=float)
-    return closure.reach.shortfall(times, closure.target(path, times)[:, 0], pose, closure.other_poses())
+    return closure.distances(path, np.asarray(times, dtype=float), pose)
 
 
 def _no_long_steps(times: Array) -> tuple[Array, NDArray[np.bool_]]:
@@ -422,17 +416,20 @@ class PathClosure:
         end = max(start, min(end, path.duration))
         knots = [knot for knot in path.knots if start < knot < end]
         times = np.unique([*np.linspace(start, end, _INSTANTS_LOOKED_AT), *knots])
-        others = self.other_poses()
-        found = self.reach.shortfall(times, self.target(path, times)[:, 0], pose, others)
+        found = self.distances(path, times, pose)
         k = found.furthest
         if not found.out[k] or times.size < 2:
             return found
         span = times[max(k - 1, 0)], times[min(k + 1, times.size - 1)]
         closer = np.setdiff1d(np.linspace(*span, _MORE_LOOKS + 2)[1:-1], times)
-        return found.joined(self.reach.shortfall(closer, self.target(path, closer)[:, 0], pose, others))
+        return found.joined(self.distances(path, closer, pose))
 
-    def other_poses(self) -> list[Array]:
-        """Return the poses of the assemblies that close."""
+    def distances(self, path: Path, times: Array, pose: Array) -> Shortfall:
+        """Return the distances of a path from the workspace at some times, from a pose or the assemblies that close."""
+        return self.reach.shortfall(times, self.target(path, times)[:, 0], pose, self._other_poses)
+
+    @cached_property
+    def _other_poses(self) -> list[Array]:
         poses = []
         for assembly in self.mechanism.assemblies:
             with suppress(AssemblyError):
