@@ -92,17 +92,15 @@ def moving_equilibrium(system: System, start: State, motion: Motion) -> Array:
     AssemblyError
         No equilibrium is found near the start.
     """
-    return _find(system, start, (), motion)
+    try:
+        return _find(system, start, (), motion)
+    except AssemblyError as error:
+        raise AssemblyError(_NO_MOVING_EQUILIBRIUM, error.moment, error.partial, _SLOWER_DRIVES) from None
 
 
 def _find(system: System, start: State, held: Sequence[str], motion: Motion | None) -> Array:
     solve = _sparse_equilibrium if system.n + system.m > _MOST_DENSE else _dense_equilibrium
-    try:
-        return solve(system, start, held, motion)
-    except AssemblyError as error:
-        if motion is None:
-            raise
-        raise AssemblyError(_NO_MOVING_EQUILIBRIUM, error.moment, error.partial, _SLOWER_DRIVES) from None
+    return solve(system, start, held, motion)
 
 
 def _dense_equilibrium(system: System, start: State, held: Sequence[str], motion: Motion | None) -> Array:

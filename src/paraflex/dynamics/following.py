@@ -106,13 +106,10 @@ def _away(system: System, signals: Signals, t: float, q: Array) -> Array:
 
 def _ways(system: System, signals: Signals, t: float, q: Array, away: Array) -> Iterator[Array]:
     """Yield poses from which to follow drives: the shorter way to their start, the whole way, the other way round."""
-    shorter = _turned(system, signals, t, q, away)
-    yield shorter
-    if not np.array_equal(shorter, q):
-        yield q
-    other = _turned(system, signals, t, q, away, other_way=True)
-    if not (np.array_equal(other, q) or np.array_equal(other, shorter)):
-        yield other
+    ways = (_turned(system, signals, t, q, away), q, _turned(system, signals, t, q, away, other_way=True))
+    for k, way in enumerate(ways):
+        if not any(np.array_equal(way, earlier) for earlier in ways[:k]):
+            yield way
 
 
 def _turned(system: System, signals: Signals, t: float, q: Array, away: Array, *, other_way: bool = False) -> Array:
@@ -183,14 +180,11 @@ def _sharpened(system: System, q: Array) -> Array:
     rows = system.constrained
     if not 0 < system.n_constraints <= min(DENSE_ROWS, system.n):
         return q
-
-    def jacobian(q: Array) -> Array:
-        return system.jacobian(q)[rows] * system.units / system.row_units[rows, None]
-
-    left, sizes, right = np.linalg.svd(jacobian(q), full_matrices=False)
+    left, sizes, right = np.linalg.svd(system.dimensionless_jacobian(q)[rows], full_matrices=False)
     if sizes[-1] > _SINGULAR * sizes[0]:
         return q
     u, v = left[:, -1], right[-1]
-    slope = (u @ jacobian(q + _PROBE * system.units * v) @ v - sizes[-1]) / _PROBE
+    beside = system.dimensionless_jacobian(q + _PROBE * system.units * v)[rows]
+    slope = (u @ beside @ v - sizes[-1]) / _PROBE
     move = -sizes[-1] / slope if slope else np.inf
     return q + move * system.units * v if abs(move) <= _SINGULAR else q

@@ -9,7 +9,7 @@ import numpy as np
 
 from paraflex.arrays import Array
 from paraflex.dynamics.coordinates import GROUND_INDEX, Marker
-from paraflex.dynamics.points import marker_place, marker_position
+from paraflex.dynamics.points import cross, marker_place, marker_position
 from paraflex.dynamics.system import System
 from paraflex.mechanism import Joint, PointRef
 
@@ -40,8 +40,7 @@ def joint_coordinate(system: System, name: str, q: Array, v: Array | None = None
     e = unit_vectors(theta)
     (pa, rows_a), (pb, rows_b) = marker_place(system, carrier, q), marker_place(system, system.marker(joint.b), q)
     d = pb - pa
-    lever = e[:, 0] * d[:, 1] - e[:, 1] * d[:, 0]
-    rows = np.einsum("ki,kij->kj", e, rows_b - rows_a) + lever[:, None] * turn
+    rows = np.einsum("ki,kij->kj", e, rows_b - rows_a) + cross(e, d)[:, None] * turn
     return JointCoordinate(np.sum(e * d, axis=1), np.sum(rows * v, axis=1), rows)
 
 

@@ -59,6 +59,11 @@ def quarter_turn(x: Array) -> Array:
     return np.column_stack([-x[:, 1], x[:, 0]])
 
 
+def cross(a: Array, b: Array) -> Array:
+    """Return the cross products (...) of vectors (..., 2)."""
+    return a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]
+
+
 def marker_motion(system: System, marker: Marker, q: Array, v: Array, a: Array) -> PointMotion:
     """Return the motion of a material point of a body for coordinates (k, n) and their derivatives.
 
@@ -133,5 +138,4 @@ def _across(stations: Array) -> Array:
     x, y = arms[:, -1:, 0], arms[:, -1:, 1]
     # Roots and products only, no norm or modulus: these are analytic, as a complex step requires.
     length = np.sqrt(x**2 + y**2)
-    length = np.where(length == 0.0, np.nan, length)
-    return (x * arms[:, :, 1] - y * arms[:, :, 0]) / length
+    return cross(arms[:, -1:], arms) / np.where(length == 0.0, np.nan, length)

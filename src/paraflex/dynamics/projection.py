@@ -191,9 +191,10 @@ def joint_gaps(system: System, phi: Array) -> dict[str, float]:
     return {name: gap for name, gap in sorted(gaps.items(), key=lambda item: -item[1]) if gap >= 0.1 * largest}
 
 
-def gap_unit(system: System, phi: Array) -> str:
-    """Return the unit of the largest number among constraint rows (m,)."""
-    return row_unit(system.rows[int(np.argmax(np.abs(phi)))])
+def gap_texts(system: System, phi: Array) -> tuple[str, str]:
+    """Return the largest residual of joints, gears and drives with its unit, and the names of those furthest open."""
+    gaps, largest = joint_gaps(system, phi), system.rows[int(np.argmax(np.abs(phi)))]
+    return f"{max(gaps.values()):.3g} {row_unit(largest)}", " and ".join(list(gaps)[:NAMED])
 
 
 def row_unit(row: str) -> str:

@@ -16,12 +16,10 @@ from paraflex.dynamics.change_points import branches_from_rest, change_point_at
 from paraflex.dynamics.following import POSITION_STIFFNESS, follow_drives
 from paraflex.dynamics.points import marker_position
 from paraflex.dynamics.projection import (
-    NAMED,
     assemble,
     closed,
     constraint_change,
-    gap_unit,
-    joint_gaps,
+    gap_texts,
     project,
     refuse_conflict,
     second_rates,
@@ -191,8 +189,7 @@ def project_position(system: System, signals: Signals, t: float, q: Array) -> Ar
         return closest
     closest = _closest(system, signals, t, q)
     phi, _ = system.constraints(signals, t, closest)
-    gaps = joint_gaps(system, phi)
-    gap, where = f"{max(gaps.values()):.3g} {gap_unit(system, phi)}", " and ".join(list(gaps)[:NAMED])
+    gap, where = gap_texts(system, phi)
     cause = f"the loops do not close: a gap of {gap} remains in {where}"
     raise AssemblyError(cause, Moment(t, 0), closest, "correct angles of the assembly, lengths or places of points")
 

@@ -189,6 +189,10 @@ class System(PlacedBodies):
         fill_jacobian(self.packed, q, jacobian)
         return jacobian
 
+    def dimensionless_jacobian(self, q: Array) -> Array:
+        """Return Phi_q at q in units of the coordinates and of the rows."""
+        return self.jacobian(q) * self.units / self.row_units[:, None]
+
 
 @checked_arguments()
 def build_system(mechanism: Mechanism, like: System | None = None) -> System:

@@ -26,7 +26,7 @@ from paraflex.errors import AssemblyError, InputError, Moment, NumericalError, U
 from paraflex.kernel.arrays import apart
 from paraflex.kernel.closure import LOOPS_CLOSED, LOOPS_SINGULAR, close_path, make_closure_scratch, task_values
 from paraflex.kernel.packed import MARKER, PackedSystem, Signals
-from paraflex.kinematics.paths import FixedPoint, Path, PathMotion, turning_of
+from paraflex.kinematics.paths import KnownPath, Path, PathMotion, turning_of
 from paraflex.kinematics.reach import PoseSearch, Shortfall
 from paraflex.limits import INSTANTS, solvable
 from paraflex.mechanism import Assembly, Mechanism, PointRef, with_actuators
@@ -167,7 +167,8 @@ def pose_at(
     InputError, AssemblyError, UnreachablePathError
         See `follow_path`.
     """
-    return path_follower(mechanism, FixedPoint(position), 0.0, assembly=assembly, orientation=orientation)([0.0]).q[0]
+    still = KnownPath(PathMotion(np.array([position]), np.zeros((1, 2)), np.zeros((1, 2))))
+    return path_follower(mechanism, still, 0.0, assembly=assembly, orientation=orientation)([0.0]).q[0]
 
 
 @checked_arguments()

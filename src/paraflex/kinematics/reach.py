@@ -220,17 +220,12 @@ class PoseSearch:
 
     def _change_at(self, q: Array) -> LeastChange:
         """Return the dimensionless least change; dense, as a search closes thousands of poses."""
-        jacobian, units, row_units = self._jacobian(q), self.system.units, self.system.row_units
+        jacobian, units, row_units = self.system.dimensionless_jacobian(q), self.system.units, self.system.row_units
         return lambda phi: units * np.linalg.lstsq(jacobian, phi / row_units, rcond=_DEPENDENT)[0]
-
-    def _jacobian(self, q: Array) -> Array:
-        """Return the dimensionless Phi_q."""
-        return self.system.jacobian(q) * self.system.units / self.system.row_units[:, None]
 
     def _slope(self, q: Array, goal: Array, multipliers: Array | None = None) -> tuple[Array, Array]:
         """Return the gradient of half the squared distance, or of the Lagrangian with multipliers; and Phi_q."""
-        values, rows = self._task(q)
-        jacobian = self._jacobian(q)
+        (values, rows), jacobian = self._task(q), self.system.dimensionless_jacobian(q)
         slope = (rows * self.system.units / self._units[:, None]).T @ ((values - goal) / self._units)
         return (slope if multipliers is None else slope + jacobian.T @ multipliers), jacobian
 

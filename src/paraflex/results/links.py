@@ -10,8 +10,8 @@ import numpy as np
 from paraflex.arrays import Array
 from paraflex.dynamics import Marker, System, end_markers, joint_coordinate, material_angle, sensor_readings
 from paraflex.dynamics.joint_loads import (
-    FrameLoad,
-    LoadErrors,
+    LoadComponents,
+    Loads,
     drive_torques,
     frame_load,
     joint_loads,
@@ -64,9 +64,9 @@ class Links:
         Angle of each joint [rad], or travel along its axis [m], and its rate; None for models without them.
     drive_torque, drive_speed : (k, drives) arrays, optional
         Torque [N m] or force [N] of each prescribed motion on its joint's second body, and the rate of that joint.
-    load_errors : LoadErrors, optional
+    load_errors : LoadComponents, optional
         Bounds of the integration errors of joint and drive loads; None if unknown.
-    frame_load : FrameLoad, optional
+    frame_load : Loads, optional
         Force and moment of the mechanism on the ground.
     sections : SectionResult, optional
         Section forces of beams; None for models without shape functions, and without flexible beams.
@@ -95,8 +95,8 @@ class Links:
     joint_speed: Array | None = None
     drive_torque: Array | None = None
     drive_speed: Array | None = None
-    load_errors: LoadErrors | None = None
-    frame_load: FrameLoad | None = None
+    load_errors: LoadComponents | None = None
+    frame_load: Loads | None = None
     sections: SectionResult | None = None
     sensors: Array | None = None
 

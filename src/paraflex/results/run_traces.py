@@ -15,8 +15,7 @@ from paraflex.control.loop.run_loop import ControllerRecord
 from paraflex.control.loop.runs import ControlledMotion, ControlledTracking
 from paraflex.dynamics import System, joint_coordinate
 from paraflex.dynamics.joint_loads import (
-    LoadErrors,
-    UndeterminedLoads,
+    LoadComponents,
     drive_torques,
     joint_parts,
     load_errors,
@@ -103,7 +102,7 @@ class SolutionTraces(Generic[R]):
         return np.where(shared, np.nan, stacked([length(each) for each in forces], len(solution.q)))
 
     @cached_property
-    def load_errors(self) -> LoadErrors:
+    def load_errors(self) -> LoadComponents:
         """Bounds of the integration errors of joint and drive loads; NaN if unknown."""
         errors = self.solution.multiplier_errors
         joints = [joint.name for joint in self.system.described.joints]
@@ -120,7 +119,7 @@ class SolutionTraces(Generic[R]):
         return self.run.controllers if isinstance(self.run, ControlledTracking | ControlledMotion) else ()
 
     @cached_property
-    def _undetermined(self) -> UndeterminedLoads:
+    def _undetermined(self) -> LoadComponents:
         names = [joint.name for joint in self.system.described.joints]
         return undetermined_loads(self.system, names, self.solution.q.real, self.solution.acting)
 
