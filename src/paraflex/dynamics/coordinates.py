@@ -6,9 +6,8 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
-from paraflex.arrays import Array, Numbers
+from paraflex.arrays import Array, Indices, Numbers
 from paraflex.dynamics.shapes import BodyShape, PointShape, beam_lumps, body_shape
 from paraflex.errors import InputError
 from paraflex.fem import (
@@ -270,7 +269,7 @@ def transverse_pieces(body: BodyCoordinates) -> Array:
     return np.array(pieces)
 
 
-def element_at(nodes: Array, place: Array) -> NDArray[np.int64]:
+def element_at(nodes: Array, place: Array) -> Indices:
     """Return the index of the element at positions of any shape along a beam; the end elements beyond its ends."""
     return np.searchsorted(np.real(nodes[1:-1]), np.real(place), side="right")
 
@@ -281,7 +280,7 @@ def transverse_rows(nodes: Array, pieces: Array, place: Array, derivative: int) 
     return piece_rows(pieces, element, place - nodes[element], derivative)
 
 
-def piece_rows(pieces: Array, element: NDArray[np.int64], z: Array, derivative: int = 0) -> Array:
+def piece_rows(pieces: Array, element: Indices, z: Array, derivative: int = 0) -> Array:
     """Evaluate polynomials of elements (see `transverse_pieces`) or a derivative at distances z from first nodes."""
     coefficients = np.polynomial.polynomial.polyder(np.eye(pieces.shape[1]), derivative)
     powers = [sum(c * z**p for p, c in enumerate(column) if c) + 0.0 * z for column in coefficients.T]

@@ -169,7 +169,7 @@ def _side(system: System, q: Array) -> float:
     rigid = [body.offset + k for body in system.bodies for k in range(3)]
     if system.n_constraints != len(rigid) or len(rigid) > DENSE_ROWS:
         return 0.0
-    return float(np.linalg.slogdet(system.jacobian(q)[np.ix_(system.constrained, rigid)])[0])
+    return float(np.linalg.slogdet(system.jacobian(q)[system.constrained][:, rigid])[0])
 
 
 def _sharpened(system: System, q: Array) -> Array:

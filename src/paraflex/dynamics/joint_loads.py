@@ -8,12 +8,11 @@ and, times the weight of the joint, of gears. A motor's torque or force acts on 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from paraflex.arrays import Array
+from paraflex.arrays import Array, Indices, Numbers
 from paraflex.dynamics.constraints import RowTerm, Term
 from paraflex.dynamics.coordinates import transverse_pieces, transverse_rows
 from paraflex.dynamics.following import driven_rows
@@ -51,9 +50,9 @@ class LoadComponents(NamedTuple):
         Those of the torques or forces of prescribed motions (k, drives); errors are (drives,) [N m, N].
     """
 
-    force: NDArray[Any]
-    moment: NDArray[Any]
-    drive: NDArray[Any]
+    force: Numbers
+    moment: Numbers
+    drive: Numbers
 
 
 class JointParts(NamedTuple):
@@ -134,9 +133,7 @@ def load_in(system: System, name: str, parts: JointParts, q: Array, multipliers:
     return Loads(force, moment)
 
 
-def undetermined_loads(
-    system: System, names: Sequence[str], q: Array, acting: NDArray[np.int64] | None = None
-) -> LoadComponents:
+def undetermined_loads(system: System, names: Sequence[str], q: Array, acting: Indices | None = None) -> LoadComponents:
     """Find the loads of joints and of all drives that redundant rows share arbitrarily.
 
     Rows are redundant in all poses (k, n) or in none: the search ends at the first pose without redundant rows.

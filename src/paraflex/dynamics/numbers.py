@@ -6,9 +6,8 @@ from collections.abc import Iterator
 from typing import Any, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
-from paraflex.arrays import Array
+from paraflex.arrays import Array, Records
 
 R = TypeVar("R", bound=tuple[Any, ...])
 
@@ -64,6 +63,6 @@ def _same(x: Any, y: Any) -> bool:
     return x.dtype.kind == "f" or bool(np.array_equal(x, y))
 
 
-def _floating(records: NDArray[np.void]) -> list[str]:
+def _floating(records: Records) -> list[str]:
     names = records.dtype.names or ()
     return [name for name in names if records.dtype[name].kind in "fc"]

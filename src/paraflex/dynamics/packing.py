@@ -7,9 +7,8 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from paraflex.arrays import Array
+from paraflex.arrays import Array, Records
 from paraflex.dynamics.constraints import Constraint, Term, coordinate
 from paraflex.dynamics.coordinates import BodyCoordinates, Marker, PlacedBodies, transverse_pieces
 from paraflex.dynamics.inputs import inputs_of
@@ -241,7 +240,7 @@ def _mass_points(body: BodyCoordinates) -> tuple[int, int]:
     return (0, 0) if body.points is None else body.points.weights.shape
 
 
-def records(dtype: np.dtype, values: list[dict[str, Any]]) -> NDArray[np.void]:
+def records(dtype: np.dtype, values: list[dict[str, Any]]) -> Records:
     """Convert dictionaries by field to records, zero for missing fields; complex if any number is."""
     blank = dict.fromkeys(dtype.names or (), 0)
     rows = [tuple((blank | value).values()) for value in values]
@@ -250,7 +249,7 @@ def records(dtype: np.dtype, values: list[dict[str, Any]]) -> NDArray[np.void]:
     return np.array(rows, dtype=dtype)
 
 
-def _body_records(bodies, ports, motor_sides, columns) -> NDArray[np.void]:
+def _body_records(bodies, ports, motor_sides, columns) -> Records:
     values: list[dict] = []
     start: Counter[str] = Counter()
     for body, body_ports, body_motors, matrix in zip(bodies, ports, motor_sides, columns, strict=True):
@@ -306,7 +305,7 @@ def _own_sizes(body: BodyCoordinates, parts: int) -> dict[str, int]:
     }
 
 
-def _marker_records(markers: list[Marker]) -> NDArray[np.void]:
+def _marker_records(markers: list[Marker]) -> Records:
     values, shape, bending = [], 0, 0
     column: dict[int, int] = {}
     for marker in markers:
@@ -327,7 +326,7 @@ def _marker_records(markers: list[Marker]) -> NDArray[np.void]:
     return records(MARKER, values)
 
 
-def _port_records(ports) -> NDArray[np.void]:
+def _port_records(ports) -> Records:
     values = []
     for body_ports in ports:
         local = 0

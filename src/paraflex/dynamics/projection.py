@@ -10,9 +10,8 @@ from collections.abc import Callable
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
-from paraflex.arrays import Array
+from paraflex.arrays import Array, Mask
 from paraflex.dynamics.inputs import inputs_of
 from paraflex.dynamics.rank import DENSE_ROWS, Dependence, constraint_jacobian, dependence, involved, joint_of_row
 from paraflex.dynamics.sparse import Saddle, elastic_stiffness, sparse_mass
@@ -48,7 +47,7 @@ def assemble(
     q: Array,
     change_at: Callable[[Array], LeastChange],
     *,
-    free: NDArray[np.bool_] | None = None,
+    free: Mask | None = None,
     longest: float = math.inf,
     offset: Array | float = 0.0,
 ) -> tuple[Array, Array]:
@@ -158,7 +157,7 @@ def constraint_change(
     damping: float = 0.0,
     *,
     every_spring: bool = False,
-    free: NDArray[np.bool_] | None = None,
+    free: Mask | None = None,
 ) -> LeastChange:
     """Return `least_change` in `link_metric` with the rows Phi_q, for all coordinates or the free ones (n,)."""
     metric = link_metric(system, q, stiffness, every_spring=every_spring)

@@ -6,9 +6,8 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
-from paraflex.arrays import Array
+from paraflex.arrays import Array, Indices, Numbers
 from paraflex.dynamics.joint_coordinates import joint_rows
 from paraflex.dynamics.system import System
 
@@ -58,7 +57,7 @@ class SingularityMeasure:
             return columns if values.size == columns else 0
         return int(np.sum(values > _DEPENDENT))
 
-    def _values(self, q: Array) -> NDArray[np.floating]:
+    def _values(self, q: Array) -> Numbers:
         rows = self._scaled(q)
         return np.linalg.svd(rows, compute_uv=False) if rows.size else np.zeros(0)
 
@@ -89,7 +88,7 @@ class SingularityMeasure:
         return [joint for joint in joints if mechanism.slides(joint) is slides]
 
     @cached_property
-    def _bodies(self) -> tuple[NDArray[np.int64], Array, Array, Array, Array]:
+    def _bodies(self) -> tuple[Indices, Array, Array, Array, Array]:
         """Start of each body's coordinates, roots of its mass and inertia, centre of mass of the undeformed body."""
         bodies = self.system.bodies
         m = np.array([body.integrals.m for body in bodies])

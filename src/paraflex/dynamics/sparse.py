@@ -10,9 +10,8 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
-from paraflex.arrays import Array, Numbers
+from paraflex.arrays import Array, Indices, Numbers
 from paraflex.dynamics.joint_coordinates import joint_coordinate
 from paraflex.dynamics.signals import no_signals
 from paraflex.dynamics.system import System
@@ -117,7 +116,7 @@ def sparse_jacobian(system: System, q: Array) -> scipy.sparse.csr_matrix:
     return jacobian
 
 
-def tied_bodies(system: System) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def tied_bodies(system: System) -> tuple[Indices, Indices]:
     """Return the pairs of a constraint row and a body that it involves, as two arrays."""
     ports = system.packed.ports
     owner = system.packed.markers["body"][ports["marker"]]
@@ -147,12 +146,12 @@ def bodies_acted_on(system: System) -> list[set[int]]:
     return neighbours(system, [[index[ref.body] for ref in pair if not ref.on_ground] for pair in ends])
 
 
-def apart_colours(tied: list[set[int]]) -> NDArray[np.int64]:
+def apart_colours(tied: list[set[int]]) -> Indices:
     """Return a colour for every body, such that two bodies of one colour act on no common body."""
     return greedy_colours([set().union(*(tied[other] for other in others)) for others in tied])
 
 
-def greedy_colours(neighbours: list[set[int]]) -> NDArray[np.int64]:
+def greedy_colours(neighbours: list[set[int]]) -> Indices:
     """Return a colour for every body, different from those of its neighbours."""
     colours = np.full(len(neighbours), -1)
     for body, others in enumerate(neighbours):
@@ -276,7 +275,7 @@ def solved(matrix: scipy.sparse.csr_matrix, units: Array, right: Array) -> Array
     return units * np.linalg.solve(rows[:, None] * scaled, rows * right)
 
 
-def _is_odd(order: NDArray[np.int64]) -> bool:
+def _is_odd(order: Indices) -> bool:
     """Return whether a permutation consists of an odd number of transpositions."""
     cycles = scipy.sparse.csgraph.connected_components(
         scipy.sparse.csr_matrix((np.ones(order.size), (np.arange(order.size), order)), shape=(order.size,) * 2)

@@ -6,9 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
-from paraflex.arrays import Array
+from paraflex.arrays import Array, Indices
 from paraflex.dynamics.inputs import inputs_of
 from paraflex.dynamics.signals import moment_signals
 from paraflex.dynamics.sparse import without_stiffness
@@ -33,7 +32,7 @@ class RestingForces:
         self.v: Array = np.zeros(system.n)
         self.a: Array = np.zeros(system.n)
         self.torques: Array = np.zeros(inputs_of(system.mechanism).acting)
-        self.springs: NDArray[np.intp] = np.nonzero(system.packed.rows["kind"] == SPRING)[0]
+        self.springs: Indices = np.nonzero(system.packed.rows["kind"] == SPRING)[0]
 
     def __call__(self, q: Array, lam: Array) -> tuple[Array, Array]:
         """Return forces and rows at coordinates (n,) with multipliers (m,)."""

@@ -9,10 +9,9 @@ from typing import Any, TypeVar
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
 from paraflex.arguments import checked_arguments, named_in_errors
-from paraflex.arrays import Array
+from paraflex.arrays import Array, Mask
 from paraflex.dynamics.body_bases import is_reduced, reduced_body
 from paraflex.dynamics.constraints import RowTerm, row_order, terms_by_joint
 from paraflex.dynamics.coordinates import BodyCoordinates, Marker, PlacedBodies, body_coordinates
@@ -65,7 +64,7 @@ class System(PlacedBodies):
         return int(np.sum(self.constrained))
 
     @cached_property
-    def constrained(self) -> NDArray[np.bool_]:
+    def constrained(self) -> Mask:
         """Mask (m,) of the constraint rows among all rows."""
         return self.packed.rows["kind"] == CONSTRAINT
 

@@ -17,10 +17,9 @@ from typing import NamedTuple
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 from scipy.sparse import csr_matrix
 
-from paraflex.arrays import Array
+from paraflex.arrays import Array, Indices
 from paraflex.dynamics.inputs import inputs_of
 from paraflex.dynamics.sparse import apart_colours, bodies_acted_on, tied_bodies
 from paraflex.dynamics.system import System
@@ -28,7 +27,6 @@ from paraflex.kernel.packed import FRICTION, INDEX_1, SPRING
 from paraflex.kernel.tangent import make_tangent, note_slopes
 from paraflex.kernel.tangent_columns import ACCELERATION, COORDINATE, VELOCITY, tangent_columns
 
-Numbers = NDArray[np.int64]
 # Weights of Phi'', Phi' and Phi for rows equal to Phi'.
 _RATES = (0.0, 1.0, 0.0)
 
@@ -69,7 +67,7 @@ class Tangents(NamedTuple):
     mass, damping, stiffness : (n, n) sparse arrays
         M, D and K, springs, dampers and friction at joints included.
     rows : (c,) array of int
-        Numbers of the system's rows that are constraints.
+        Indices of the system's rows that are constraints.
     jacobian : (c, n) sparse array
         Phi_q of these rows.
     rate : (c, n) sparse array
@@ -77,7 +75,7 @@ class Tangents(NamedTuple):
     second_place, second_rate : (c, n) sparse arrays
         Derivatives of Phi'' by the coordinates and by the velocities.
     compliant : (m - c,) array of int
-        Numbers of the rows of springs, dampers and friction at joints.
+        Indices of the rows of springs, dampers and friction at joints.
     compliant_place, compliant_rate : (m - c, n) sparse arrays
         Derivatives of their multipliers by the coordinates and the velocities.
     """
@@ -85,12 +83,12 @@ class Tangents(NamedTuple):
     mass: csr_matrix
     damping: csr_matrix
     stiffness: csr_matrix
-    rows: Numbers
+    rows: Indices
     jacobian: csr_matrix
     rate: csr_matrix
     second_place: csr_matrix
     second_rate: csr_matrix
-    compliant: Numbers
+    compliant: Indices
     compliant_place: csr_matrix
     compliant_rate: csr_matrix
 
@@ -99,16 +97,16 @@ class _Pattern(NamedTuple):
     """Sparsity pattern of a matrix (rows, columns), and the index of the computed value of each entry."""
 
     shape: tuple[int, int]
-    pointers: Numbers
-    columns: Numbers
-    sources: Numbers
+    pointers: Indices
+    columns: Indices
+    sources: Indices
 
     def matrix(self, values: Array) -> csr_matrix:
         """Return the matrix of computed columns (sources, rows)."""
         return csr_matrix((values.ravel()[self.sources], self.columns, self.pointers), shape=self.shape)
 
 
-def rows_of(rows: Numbers, *matrices: csr_matrix) -> tuple[csr_matrix, ...]:
+def rows_of(rows: Indices, *matrices: csr_matrix) -> tuple[csr_matrix, ...]:
     """Return selected rows of matrices with the same sparsity pattern."""
     pointers, columns, shape = matrices[0].indptr, matrices[0].indices, matrices[0].shape
     assert shape is not None
@@ -136,11 +134,11 @@ class Tangency:
         return bodies_acted_on(self.system)
 
     @cached_property
-    def _colours(self) -> Numbers:
+    def _colours(self) -> Indices:
         return apart_colours(self._tied)
 
     @cached_property
-    def _sources(self) -> tuple[int, list[Numbers]]:
+    def _sources(self) -> tuple[int, list[Indices]]:
         """Number of computed columns, and for each body those of its coordinates."""
         size = np.array([3 + body.nf for body in self.system.bodies])
         first, starts = 0, []
@@ -163,7 +161,7 @@ class Tangency:
             touched[body].append(row)
         return self._pattern([np.array(rows, dtype=int) for rows in touched], self.system.m)
 
-    def _pattern(self, met: list[Numbers], rows: int) -> _Pattern:
+    def _pattern(self, met: list[Indices], rows: int) -> _Pattern:
         """Return the pattern of a matrix with `rows` rows, given those that the coordinates of each body affect."""
         parts = []
         for body, source, own in zip(self.system.bodies, self._sources[1], met, strict=True):

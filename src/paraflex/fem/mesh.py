@@ -6,9 +6,8 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from paraflex.arrays import Array
+from paraflex.arrays import Array, Indices
 from paraflex.errors import InputError
 from paraflex.fem.element import (
     AXIAL,
@@ -43,7 +42,7 @@ class BeamMesh:
     """
 
     nodes: Array
-    spans: NDArray[np.int64]
+    spans: Indices
     points: Mapping[str, int]
     separate: tuple[int, ...] = ()
 
@@ -107,7 +106,7 @@ class BeamMesh:
         """Return the transverse displacement per nodal coordinate, or a derivative: see `axial_rows`."""
         return self.scatter(element, transverse_shape(x, self.nodes[element + 1] - self.nodes[element], derivative))
 
-    def rows_of(self, coordinate: int) -> NDArray[np.int64]:
+    def rows_of(self, coordinate: int) -> Indices:
         """Return the indices of one of the four coordinates at every node."""
         return np.arange(coordinate, COORDINATES_PER_NODE * self.nodes.size, COORDINATES_PER_NODE)
 

@@ -8,10 +8,9 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from paraflex.arguments import checked_arguments
-from paraflex.arrays import Array
+from paraflex.arrays import Array, Indices, Mask
 from paraflex.dynamics import (
     System,
     assembled_position,
@@ -271,7 +270,7 @@ def reach_shortfall(
     return closure.distances(path, np.asarray(times, dtype=float), pose)
 
 
-def _no_long_steps(times: Array) -> tuple[Array, NDArray[np.bool_]]:
+def _no_long_steps(times: Array) -> tuple[Array, Mask]:
     """Return times refined to the longest closure step, and which of them were given."""
     pieces = np.maximum(1.0, np.ceil(np.diff(times) / _LONGEST_STEP * (1.0 - 1e-9)))
     if np.sum(pieces) > INSTANTS:
@@ -306,7 +305,7 @@ class PathClosure:
         self.orientation = orientation
         end = end if end > 0.0 else 1.0
         self.signals: Signals = still_signals(self.system.mechanism, end)[0]
-        self.coordinates: NDArray[np.int64] = np.array([TASK_COORDINATES.index(name) for name in effector.coordinates])
+        self.coordinates: Indices = np.array([TASK_COORDINATES.index(name) for name in effector.coordinates])
         self.packed, self.marker = with_marker(self.system, effector.point)
         self.reach: PoseSearch = PoseSearch(self.system, effector.point, self.coordinates, self.signals)
 
@@ -381,7 +380,7 @@ class PathClosure:
             cause, detail = "the path's start is not reached from the assembly's pose", _OTHER
         raise self._unreachable(cause, detail, found, start, 0, None)
 
-    def walk(self, path: Path, pose: Array, grid: Array, keep: NDArray[np.bool_]) -> RigidMotion:
+    def walk(self, path: Path, pose: Array, grid: Array, keep: Mask) -> RigidMotion:
         """Return the motion at the instants of a grid, with further instants where steps are too long."""
         intervals = []
         while True:

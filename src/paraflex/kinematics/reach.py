@@ -7,9 +7,8 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from paraflex.arrays import Array
+from paraflex.arrays import Array, Indices, Mask
 from paraflex.dynamics import System
 from paraflex.dynamics.joint_coordinates import material_angle
 from paraflex.dynamics.points import marker_place
@@ -77,12 +76,12 @@ class Shortfall:
     own: Array
 
     @property
-    def out(self) -> NDArray[np.bool_]:
+    def out(self) -> Mask:
         """Mask (k,) of instants at which no pose reaches the position."""
         return (self.distance > 0.0) | (self.turn > 0.0)
 
     @property
-    def elsewhere(self) -> NDArray[np.bool_]:
+    def elsewhere(self) -> Mask:
         """Mask (k,) of instants at which poses reach the position, but none near the pose before."""
         return ~self.out & (self.own > 0.0)
 
@@ -124,7 +123,7 @@ class PoseSearch:
 
     system: System
     point: PointRef
-    coordinates: NDArray[np.int64]
+    coordinates: Indices
     signals: Signals
 
     def nearest(self, t: float, goal: Array, q: Array) -> NearestPose:
