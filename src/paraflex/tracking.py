@@ -338,7 +338,14 @@ def plan_tracking(
     InputError, AssemblyError, UnreachablePathError
         See `kinematics.follow_path`; a path that moves a sliding point off its beam, where `at_end` is "error".
     """
-    mechanism, path = _planned(mechanism, path)
+    source, mechanism = mechanism, Mechanism.from_source(mechanism)
+    if isinstance(path, str):
+        if isinstance(source, Mechanism):
+            raise InputError(
+                "a mechanism has no paths by name", field="path", value=path,
+                remedy="give the model that paraflex.load reads instead of its mechanism, or a path such as Polygon",
+            )  # fmt: skip
+        path = source.path(path)
     mechanism = standing(mechanism, assembly)
     end = path.duration if duration is None else duration
     check_times(end, samples)
@@ -426,19 +433,6 @@ def simulate(
     if warning:
         run.warn()
     return run
-
-
-def _planned(given: Mechanism | ModelWithPaths, path: Path | str) -> tuple[Mechanism, Path]:
-    """Return the mechanism and the path, which may be given by its name in a model."""
-    mechanism = Mechanism.from_source(given)
-    if not isinstance(path, str):
-        return mechanism, path
-    if isinstance(given, Mechanism):
-        raise InputError(
-            "a mechanism has no paths by name", field="path", value=path,
-            remedy="give the model that paraflex.load reads instead of its mechanism, or a path such as Polygon",
-        )  # fmt: skip
-    return mechanism, given.path(path)
 
 
 def _drive(

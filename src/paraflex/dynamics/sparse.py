@@ -119,11 +119,9 @@ def sparse_jacobian(system: System, q: Array) -> scipy.sparse.csr_matrix:
 def tied_bodies(system: System) -> tuple[Indices, Indices]:
     """Return the pairs of a constraint row and a body that it involves, as two arrays."""
     ports = system.packed.ports
-    owner = system.packed.markers["body"][ports["marker"]]
-    pairs = np.column_stack([np.repeat(ports["row"], ports["rows"]), np.repeat(owner, ports["rows"])])
-    first = np.concatenate([[0], np.cumsum(ports["rows"])])[:-1]
-    pairs[:, 0] += np.arange(len(pairs)) - np.repeat(first, ports["rows"])
-    pairs = np.unique(pairs, axis=0)
+    pairs = np.column_stack([ports["row"], system.packed.markers["body"][ports["marker"]]])
+    second = pairs[ports["rows"] == 2] + [1, 0]
+    pairs = np.unique(np.concatenate([pairs, second]), axis=0)
     return pairs[:, 0], pairs[:, 1]
 
 
