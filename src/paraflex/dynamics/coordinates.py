@@ -19,6 +19,7 @@ from paraflex.fem import (
     modal_basis,
     node_weights,
 )
+from paraflex.fem.eigen import is_definite
 from paraflex.mechanism import Body, FlexibleBeam, Geometry, Mechanism, PointRef, RigidBody
 
 GROUND_INDEX = -1
@@ -170,7 +171,9 @@ def body_coordinates(body: Body, geometry: Geometry, like: ModalBasis | None = N
         if like is not None:
             modes = modes.like(like, integrals.Mff)
         integrals = integrals.in_basis(modes.vectors)
-        _check_mass(integrals)
+        # The inertia about the centre of mass may be rounding against that about the origin.
+        if not is_definite(np.real(integrals.mass_matrix), _SINGULAR):
+            raise np.linalg.LinAlgError("not positive definite")
     except np.linalg.LinAlgError as error:
         raise InputError(
             "its mass matrix is not positive definite, or only by rounding", field=f"body.{body.name}",
@@ -181,24 +184,6 @@ def body_coordinates(body: Body, geometry: Geometry, like: ModalBasis | None = N
     if geometry is Geometry.SECOND_ORDER and integrals.nf and isinstance(body, FlexibleBeam):
         points = mass_points(body.mesh, body.spans, beam_lumps(body), integrals.D)
     return BodyCoordinates(body.name, 0, integrals, modes, shape, points, np.zeros((integrals.nf, integrals.nf)))
-
-
-def _check_mass(body: ShapeIntegrals) -> None:
-    """Check that the mass matrix of a whole undeformed body is positive definite beyond rounding.
-
-    It is not if the inertia about its centre of mass is rounding against the inertia about its origin.
-
-    Raises
-    ------
-    numpy.linalg.LinAlgError
-        It is not.
-    """
-    mass = np.real(body.mass_matrix)
-    if np.all(np.isfinite(mass)) and np.all(np.diag(mass) > 0.0):
-        size = np.sqrt(np.diag(mass))
-        if np.linalg.eigvalsh(mass / size / size[:, None])[0] > _SINGULAR:
-            return
-    raise np.linalg.LinAlgError("not positive definite")
 
 
 @dataclass(frozen=True)

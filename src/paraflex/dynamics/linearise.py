@@ -103,7 +103,7 @@ def natural_frequencies(
     """
     M, J = sparse_mass(system, state.q), sparse_jacobian(system, state.q)
     efforts = sparse_joint_rows(system, dict.fromkeys([*held, *torque_at]), state.q)
-    lam, _, acceleration = forces_at_rest(system, state, Inertia(M, J, efforts))
+    lam, _, acceleration = forces_at_rest(system, state, M, J, efforts)
     elastic, other = stiffness_diagonal(system), pose_stiffness(system, state.time, state.q, lam)
     C = scipy.sparse.csr_matrix(scipy.sparse.vstack([J, sparse_joint_rows(system, dict.fromkeys(held), state.q)]))
     typical = typical_square(elastic, other, M)
@@ -137,14 +137,6 @@ def slowest_deflection(system: System, q: Array) -> float:
     return float(np.sqrt(np.min(squares[squares > _FREE * typical], initial=np.inf)))
 
 
-class Inertia(NamedTuple):
-    """Mass (n, n), Phi_q (m, n), and derivatives (joints, n) of joint coordinates, as forces at rest require."""
-
-    mass: Sparse
-    constraints: Sparse
-    joints: Sparse
-
-
 class RestForces(NamedTuple):
     """Forces that hold a mechanism at a pose.
 
@@ -163,14 +155,21 @@ class RestForces(NamedTuple):
     acceleration: float
 
 
-def forces_at_rest(system: System, state: State, inertia: Inertia) -> RestForces:
-    """Return the constraint forces at a pose at rest, held by motors at the joints of `inertia`."""
+def forces_at_rest(system: System, state: State, M: Sparse, constraints: Sparse, joints: Sparse) -> RestForces:
+    """Return the constraint forces at a pose at rest, held by motors at joints.
+
+    Parameters
+    ----------
+    system, state
+        System, and the state at the pose.
+    M, constraints, joints : (n, n), (m, n) and (joints, n) sparse matrices
+        Mass matrix, Phi_q, and derivatives of the coordinates of the joints with motors.
+    """
     forces, lam = RestingForces(system, state.time), np.zeros(system.m)
     springs = forces.springs
     lam[springs] = forces(state.q, lam)[1] / system.packed.rows["compliance"][springs]
     f = forces(state.q, lam)[0] + stiffness_diagonal(system) * state.q
-    M, rows = inertia.mass, scipy.sparse.csr_matrix(scipy.sparse.vstack([inertia.constraints, inertia.joints]))
-    a, mu = Saddle(M, rows).solve(-f)
+    a, mu = Saddle(M, scipy.sparse.csr_matrix(scipy.sparse.vstack([constraints, joints]))).solve(-f)
     acceleration = float(np.sqrt(max(a @ (M @ a), 0.0) / system.total_mass))
     return RestForces(lam + mu[: system.m], -mu[system.m :], acceleration)
 

@@ -330,9 +330,8 @@ def sensor_rows(
         own = each.taken(state)
         sizes = [values.shape[1] for values in own]
         steps = np.split(1j * _STEP * np.eye(sum(sizes)), np.cumsum(sizes)[:-1], axis=1)
-        slopes = (
-            np.imag(each.read(MotionSamples(*(values + step for values, step in zip(own, steps, strict=True))))) / _STEP
-        )
+        moved = MotionSamples(*(values + step for values, step in zip(own, steps, strict=True)))
+        slopes = np.imag(each.read(moved)) / _STEP
         for kind, columns, values in zip(entries, each.columns, np.split(slopes, np.cumsum(sizes)[:-1]), strict=True):
             kind.append((columns, values))
     return SensorRows(*(_sparse(kind, values.shape[1]) for kind, values in zip(entries, state, strict=True)))

@@ -129,9 +129,8 @@ def profile_signal(place: str, profile: TimeProfile, end: float, left: float = 0
     if getattr(profile, "breaks", None) is not None:
         left = 0.0  # quintic already
     # The profile or a derivative may jump at a knot: the pieces on either side take its one-sided limits.
-    parts = []
-    for a, b in pairwise([0.0, *inner, end]):
-        parts.append(_refined(place, profile, _grid(profile, a, b, end), left))
+    intervals = pairwise([0.0, *inner, end])
+    parts = [_refined(place, profile, _grid(profile, a, b, end), left) for a, b in intervals]
     breaks = np.concatenate([part.breaks[:-1] for part in parts] + [parts[-1].breaks[-1:]])
     return InputSignals(breaks, np.vstack([part.coefficients for part in parts])), inner
 

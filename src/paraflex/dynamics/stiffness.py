@@ -36,7 +36,9 @@ class RestingForces:
 
     def __call__(self, q: Array, lam: Array) -> tuple[Array, Array]:
         """Return forces and rows at coordinates (n,) with multipliers (m,)."""
-        self._evaluate(q, lam)
+        equations(
+            self.packed, self.signals, self.time, INDEX_1, q, self.v, self.a, lam, self.torques, self.workspace
+        )  # fmt: skip
         return self.workspace.f.copy(), self.workspace.rows[self.springs]
 
     def compliant(self, q: Array) -> Array:
@@ -46,13 +48,8 @@ class RestingForces:
         # here.
         scale = np.where(rows["kind"] == FRICTION, 1.0, rows["compliance"])
         self.workspace.compliance[:] = scale
-        self._evaluate(q, np.zeros(rows.size))
+        self(q, np.zeros(rows.size))
         return np.divide(self.workspace.rows, scale, out=np.zeros(rows.size), where=rows["kind"] != CONSTRAINT)
-
-    def _evaluate(self, q: Array, lam: Array) -> None:
-        equations(
-            self.packed, self.signals, self.time, INDEX_1, q, self.v, self.a, lam, self.torques, self.workspace
-        )  # fmt: skip
 
 
 def pose_stiffness(system: System, time: float, q: Array, lam: Array) -> scipy.sparse.csr_matrix:

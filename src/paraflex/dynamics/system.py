@@ -167,8 +167,6 @@ class System(PlacedBodies):
     @cached_property
     def described_rows(self) -> tuple[str, ...]:
         """Names of the rows of the mechanism as described."""
-        if self.mechanism.cut is None:
-            return self.rows
         return tuple(label for one in row_order(self.described) for label in one.labels)
 
     def workspace(self) -> Workspace:

@@ -128,11 +128,9 @@ class Tangency:
     def _sources(self) -> tuple[int, list[Indices]]:
         """Number of computed columns, and for each body those of its coordinates."""
         size = np.array([3 + body.nf for body in self.system.bodies])
-        first, starts = 0, []
-        for colour in range(int(self._colours.max()) + 1):
-            starts.append(first)
-            first += int(size[self._colours == colour].max())
-        return first, [starts[colour] + np.arange(n) for colour, n in zip(self._colours, size, strict=True)]
+        widths = [int(size[self._colours == colour].max()) for colour in range(int(self._colours.max()) + 1)]
+        starts = np.cumsum([0, *widths])
+        return int(starts[-1]), [starts[colour] + np.arange(n) for colour, n in zip(self._colours, size, strict=True)]
 
     @cached_property
     def _force_pattern(self) -> _Pattern:

@@ -225,11 +225,9 @@ def bar_integrals(
         across = np.outer(N[0], N[1])
         G2 += dm * (across - across.T)
 
-    J, Jf, Jff = 0.0, np.zeros(n, kind), np.zeros((n, n), kind)
-    for slope, inertia in turning:
-        J += inertia
-        Jf += inertia * slope
-        Jff += inertia * np.outer(slope, slope)
+    J = sum((inertia for _, inertia in turning), 0.0)
+    Jf = sum((inertia * slope for slope, inertia in turning), np.zeros(n, kind))
+    Jff = sum((inertia * np.outer(slope, slope) for slope, inertia in turning), np.zeros((n, n), kind))
     return ShapeIntegrals(
         m=m, S1=S1, S2=S2, I0=I0, I1=I1, I2=I2, G1=G1, G2=G2, J=J, Jf=Jf, Jff=Jff, K=stiffness, D=basis
     )

@@ -348,18 +348,16 @@ class PathClosure:
         full = np.concatenate([np.stack(motion), turning[:, :, None]], axis=2)
         return np.ascontiguousarray(full[:, :, self.coordinates].transpose(1, 0, 2))
 
-    def run(
-        self, times: Array, target: Array, pose: Array
-    ) -> tuple[int, int, float, tuple[Array, Array, Array, Array]]:
-        """Close the loops along targets; return status, index, residual, and the computed arrays."""
+    def run(self, times: Array, target: Array, pose: Array) -> tuple[int, int, tuple[Array, Array, Array, Array]]:
+        """Close the loops along targets; return status, index, and the computed arrays."""
         k, n = times.size, self.system.n
         q, v, a = apart((3, k, n))
         basis = apart((k, n, self.coordinates.size))
         q[0] = pose
         scratch = make_closure_scratch(self.packed, self.coordinates.size, self.signals.start.size)
         given = (self.packed, self.signals, self.marker, self.coordinates, times, target)
-        status, index, residual = close_path(*given, q, v, a, basis, scratch)
-        return status, int(index), residual, (q, v, a, basis)
+        status, index, _ = close_path(*given, q, v, a, basis, scratch)
+        return status, int(index), (q, v, a, basis)
 
     def approach(self, path: Path, pose: Array, start: float, end: float) -> Array:
         """Move the end-effector from the assembly to the start of the path, staying in that assembly."""
@@ -370,7 +368,7 @@ class PathClosure:
             fractions = np.linspace(0.0, 1.0, steps + 1)
             target = np.zeros((steps + 1, 3, goal.size))
             target[:, 0] = here + fractions[:, None] * (goal - here)
-            status, index, _, (q, *_) = self.run(np.zeros(steps + 1), target, pose)
+            status, index, (q, *_) = self.run(np.zeros(steps + 1), target, pose)
             if status == LOOPS_CLOSED:
                 return q[-1]
             reached = q[index - 1] if index else reached
@@ -385,7 +383,7 @@ class PathClosure:
         intervals = []
         while True:
             target = self.target(path, grid)
-            status, index, _, found = self.run(grid, target, pose)
+            status, index, found = self.run(grid, target, pose)
             last = index - 1
             if status in (LOOPS_CLOSED, LOOPS_SINGULAR) or last < 0 or grid[index] - grid[last] < _SHORTEST_STEP:
                 break

@@ -22,7 +22,6 @@ from scipy.sparse import csr_matrix
 from paraflex.arrays import Array
 from paraflex.dynamics import System, joint_coordinate, material_angle
 from paraflex.dynamics.constraints import coordinate_kind
-from paraflex.dynamics.linearise import Inertia
 from paraflex.dynamics.points import marker_place
 from paraflex.dynamics.system import with_constraints_of
 from paraflex.dynamics.tangents import MotionPoint, Tangency, Tangents
@@ -210,13 +209,13 @@ class Coordinates:
     def _rows_of(self, joints: Sequence[str]) -> NDArray[np.int64]:
         return np.array([self._rows[0][joint] for joint in joints], dtype=int)
 
-    def inertia(self, time: float, q: Array, joints: Sequence[str]) -> Inertia:
+    def inertia(self, time: float, q: Array, joints: Sequence[str]) -> tuple[csr_matrix, csr_matrix, csr_matrix]:
         """Return mass matrix, constraint rows and joint rows at coordinates q (n,)."""
         mass, jacobian = self.tangency.inertia(time, q)
         number = self._rows[1]
         own = np.nonzero(number >= 0)[0]
         constraints, rows = own[np.argsort(number[own])], self._rows_of(joints)
-        return Inertia(mass, jacobian[constraints], jacobian[rows])
+        return mass, jacobian[constraints], jacobian[rows]
 
     def at(self, point: MotionPoint) -> PointTangents:
         """Compute the tangent matrices at an operating point."""

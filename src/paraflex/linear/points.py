@@ -30,7 +30,7 @@ def resting_point(coordinates: Coordinates, state: State, mode: ActuationMode) -
     system = coordinates.system
     active = [(k, motor.joint) for k, motor in enumerate(system.mechanism.motors) if motor.name in mode.motors]
     joints = list(dict.fromkeys(joint for _, joint in active))
-    found = forces_at_rest(system, state, coordinates.inertia(state.time, state.q, joints))
+    found = forces_at_rest(system, state, *coordinates.inertia(state.time, state.q, joints))
     efforts = dict(zip(joints, found.efforts, strict=True))
     torques = _acting(system, state.time, {k: efforts[joint] for k, joint in active})
     still = np.zeros(system.n)

@@ -11,6 +11,7 @@ import numpy as np
 from paraflex.arguments import CheckedFields
 from paraflex.errors import InputError
 from paraflex.fem import ShapeIntegrals
+from paraflex.fem.eigen import is_definite
 from paraflex.mechanism.damping import Damping
 from paraflex.mechanism.quantities import in_unit, positive
 
@@ -190,12 +191,8 @@ def _check_definite(s: ShapeIntegrals) -> None:
 
 
 def _definite(matrix: np.ndarray, field: str, remedy: str) -> None:
-    diagonal = np.diag(matrix)
-    if np.all(diagonal > 0.0):
-        sizes = np.sqrt(diagonal)
-        if np.linalg.eigvalsh(matrix / np.outer(sizes, sizes))[0] > _SMALLEST_EIGENVALUE:
-            return
-    raise InputError("is not positive definite", field=field, remedy=remedy)
+    if not is_definite(matrix, _SMALLEST_EIGENVALUE):
+        raise InputError("is not positive definite", field=field, remedy=remedy)
 
 
 def _symmetric(matrix: np.ndarray, field: str, sign: float = 1.0) -> np.ndarray:
