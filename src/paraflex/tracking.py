@@ -421,11 +421,12 @@ def simulate(
     run_of = partial(
         TrackingRun, task, torques, actuation_condition(task.effort, torques.mode), method=options.method.title
     )
+    march = partial(integrate, options=options, samples=task.motion.t.size, on_progress=on_progress)
     try:
         if task.holds:
-            run = _drive_and_hold(task, torques, run_of, options, on_progress)
+            run = _drive_and_hold(task, torques, run_of, march)
         else:
-            run = run_of(_drive(task, torques, task.motion.t, options, on_progress))
+            run = run_of(_drive(task, torques, task.motion.t, march))
     except IntegrationError as error:
         if not isinstance(error.partial, TrackingRun):
             error.partial = run_of(error.partial)
@@ -435,31 +436,18 @@ def simulate(
     return run
 
 
-def _drive(
-    task: TrackingTask,
-    torques: FeedForward,
-    times: Array,
-    options: IntegrationOptions,
-    on_progress: Callable[[float], None] | None,
-) -> Solution:
+def _drive(task: TrackingTask, torques: FeedForward, times: Array, march: Callable[..., Solution]) -> Solution:
     signals, knots = pack_signals(task.mechanism, torques.signals, float(task.motion.t[-1]))
     stops = np.sort(np.concatenate([path_stops(torques.knots, task.mechanism), knots]))
     try:
-        return integrate(
-            task.system, signals, task.start, times, knots=stops, options=options, samples=task.motion.t.size,
-            on_progress=on_progress,
-        )  # fmt: skip
+        return march(task.system, signals, task.start, times, knots=stops)
     except IntegrationError as error:
         with_likely_cause(error, (task.whole or task).mechanism)
         raise
 
 
 def _drive_and_hold(
-    task: TrackingTask,
-    torques: FeedForward,
-    run_of: Callable[..., TrackingRun],
-    options: IntegrationOptions,
-    on_progress: Callable[[float], None] | None,
+    task: TrackingTask, torques: FeedForward, run_of: Callable[..., TrackingRun], march: Callable[..., Solution]
 ) -> TrackingRun:
     """Drive along the path, then continue with the joints of the active motors locked."""
     times, end = task.motion.t, task.path.duration
@@ -467,7 +455,7 @@ def _drive_and_hold(
     until = times[:count]
     if count == 0 or until[-1] < end * (1.0 - _SAME_TIME):
         until = np.append(until, end)
-    driven = _drive(task, torques, until, options, on_progress)
+    driven = _drive(task, torques, until, march)
     if driven.status != "complete":
         return run_of(driven)
     motors = [motor for motor in task.mechanism.motors if motor.name in torques.mode.motors]
@@ -485,10 +473,7 @@ def _drive_and_hold(
         return run_of(solution, holding=holding)
 
     try:
-        held = integrate(
-            braked.system, signals, braked.state, times[count:], knots=np.array(knots), options=options,
-            begun=driven, samples=times.size, on_progress=on_progress,
-        )  # fmt: skip
+        held = march(braked.system, signals, braked.state, times[count:], knots=np.array(knots), begun=driven)
     except IntegrationError as error:
         error.partial = whole(with_likely_cause(error, (task.whole or task).mechanism).partial)
         raise

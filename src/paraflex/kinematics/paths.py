@@ -91,11 +91,10 @@ class Polygon(CheckedFields):
         corners = _points(self.corners, "corners", 2)
         object.__setattr__(self, "corners", tuple(map(tuple, corners.tolist())))
         positive(self.max_acceleration, "max_acceleration", "m/s^2")
-        for length in self._lengths:
-            if not length > 0.0:
-                raise InputError(
-                    "two neighbouring corners coincide", field="corners", value=self.corners, remedy="drop one of them"
-                )
+        if not np.all(self._lengths > 0.0):
+            raise InputError(
+                "two neighbouring corners coincide", field="corners", value=self.corners, remedy="drop one of them"
+            )
 
     @cached_property
     def _vertices(self) -> Array:
