@@ -91,10 +91,8 @@ def balanced_state(system: System, start: State, driven: Mapping[str, JointMotio
     prescribed = {one.joint: one for one in system.mechanism.prescribed}
     driven = {joint: motion for joint, motion in driven.items() if joint not in prescribed}
     now = np.array([start.time])
-    rates = [one.profile.evaluate(now)[1][0] for one in prescribed.values()] + [
-        motion.rate for motion in driven.values()
-    ]
-    if not np.any(rates):
+    rates = [one.profile.evaluate(now)[1][0] for one in prescribed.values()]
+    if not np.any([*rates, *(motion.rate for motion in driven.values())]):
         return static_equilibrium(system, start, list(driven))
     drives = _driven(system, start, driven)
     if not _prescribes_all(drives, start):

@@ -58,18 +58,14 @@ class SingularityMeasure:
         return int(np.sum(values > _DEPENDENT))
 
     def _values(self, q: Array) -> Numbers:
-        rows = self._scaled(q)
-        return np.linalg.svd(rows, compute_uv=False) if rows.size else np.zeros(0)
-
-    def _scaled(self, q: Array) -> Array:
-        """Return the matrix (rows, 3 bodies) by displacements and rotations of centres of mass, scaled by inertia."""
+        """Return the singular values of the matrix by motions of centres of mass, scaled by inertia (rows, 3 bodies)."""
         rows, (at, root_m, root_J, cx, cy) = self._rows(q), self._bodies
         x, y, turn = rows[:, at], rows[:, at + 1], rows[:, at + 2]
         c, s = np.cos(q[at + 2]), np.sin(q[at + 2])
         arm_x, arm_y = c * cx - s * cy, s * cx + c * cy
         about = turn + x * arm_y - y * arm_x
         scaled = np.hstack([x / root_m, y / root_m, about / root_J])
-        return scaled / np.linalg.norm(scaled, axis=1, keepdims=True)
+        return np.linalg.svd(scaled / np.linalg.norm(scaled, axis=1, keepdims=True), compute_uv=False)
 
     def _rows(self, q: Array) -> Array:
         jacobian = self.system.jacobian(q)[self.system.constrained]
