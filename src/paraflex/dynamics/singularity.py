@@ -58,7 +58,7 @@ class SingularityMeasure:
         return int(np.sum(values > _DEPENDENT))
 
     def _values(self, q: Array) -> Numbers:
-        """Return the singular values of the matrix by motions of centres of mass, scaled by inertia (rows, 3 bodies)."""
+        """Return the singular values of the matrix by motions of the bodies' centres of mass, scaled by inertia."""
         rows, (at, root_m, root_J, cx, cy) = self._rows(q), self._bodies
         x, y, turn = rows[:, at], rows[:, at + 1], rows[:, at + 2]
         c, s = np.cos(q[at + 2]), np.sin(q[at + 2])
