@@ -119,8 +119,8 @@ def sparse_jacobian(system: System, q: Array) -> scipy.sparse.csr_matrix:
 def tied_bodies(system: System) -> tuple[Indices, Indices]:
     """Return the pairs of a constraint row and a body that it involves, as two arrays."""
     ports = system.packed.ports
-    pairs = np.column_stack([ports["row"], system.packed.markers["body"][ports["marker"]]])
-    second = pairs[ports["rows"] == 2] + [1, 0]
+    pairs: Indices = np.column_stack([ports["row"], system.packed.markers["body"][ports["marker"]]])
+    second: Indices = pairs[ports["rows"] == 2] + np.array([1, 0])
     pairs = np.unique(np.concatenate([pairs, second]), axis=0)
     return pairs[:, 0], pairs[:, 1]
 

@@ -120,7 +120,7 @@ class RowTangents(NamedTuple):
 
     def taken(self, rows: NDArray[np.int64]) -> RowTangents:
         """Return the tangents of some of the rows."""
-        return RowTangents(*(part[rows] for part in self))
+        return RowTangents(*(part[rows] for part in self[:4]), number=self.number[rows])
 
     def with_rows(self, others: RowTangents) -> RowTangents:
         """Return the tangents of these rows followed by others."""
