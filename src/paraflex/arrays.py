@@ -11,3 +11,7 @@ Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 # Real, or complex where a complex step carries a derivative.
 Numbers = NDArray[Any]
+Indices = NDArray[np.int64]
+Mask = NDArray[np.bool_]
+# Records of the kernels: arrays with named fields.
+Records = NDArray[np.void]

@@ -27,7 +27,8 @@ import numpy as np
 from paraflex.actuation import FeedForward, actuation_condition
 from paraflex.arguments import checked_arguments
 from paraflex.arrays import Array
-from paraflex.dynamics import BodyCoordinates, System, acting_loads, joint_coordinate, pack_signals
+from paraflex.dynamics import System, acting_loads, joint_coordinate, pack_signals, undeformed_motion
+from paraflex.dynamics.points import quarter_turn
 from paraflex.errors import InputError, IntegrationError
 from paraflex.integrators import Solution
 from paraflex.integrators.beam_ends import beyond_ends, end_of_motion
@@ -104,8 +105,7 @@ def simulate_ked(
     nominal, rigid = _nominal(task, times), task.motion
     end = end_of_motion(rigid.system, rigid.t, rigid.q, rigid.v)
     stop = math.inf if end is None else end.time
-    stiffness = [np.diag(np.concatenate([np.zeros(3), body.modes.omega**2])) for body in task.system.bodies]
-    blocks = [Block(body.all, _mass(body), K) for body, K in zip(task.system.bodies, stiffness, strict=True)]
+    blocks = [Block(body.all, body.mass_matrix, np.diag(body.stiffness)) for body in task.system.bodies]
     held = [motor.joint for motor in task.mechanism.motors if motor.name in torques.mode.motors]
     kept: list[Response] = []
     reached: list[float] = []
@@ -209,8 +209,8 @@ class _NominalMotion:
         for body in self.system.bodies:
             r = body.position
             w, dw = self.v[:, body.angle, None], self.a[:, body.angle, None]
-            rates[:, r] += w * _quarter(xi[:, r])
-            seconds[:, r] += 2.0 * w * _quarter(dxi[:, r]) + dw * _quarter(xi[:, r]) - w**2 * xi[:, r]
+            rates[:, r] += w * quarter_turn(xi[:, r])
+            seconds[:, r] += 2.0 * w * quarter_turn(dxi[:, r]) + dw * quarter_turn(xi[:, r]) - w**2 * xi[:, r]
         turned = (_turned(self.system, values, self.angles) for values in (xi, rates, seconds))
         q, v, a = (nominal + change for nominal, change in zip((self.q, self.v, self.a), turned, strict=True))
         return q, v, a
@@ -219,14 +219,7 @@ class _NominalMotion:
 def _nominal(task: TrackingTask, times: Array) -> _NominalMotion:
     """Return the rigid motion in the coordinates of the task's system."""
     rigid = task.plan.follow(times)
-    q, v, a = np.zeros((3, times.size, task.system.n))
-    for body in task.system.bodies:
-        # A beam in one segment has another name; more segments have springs between them.
-        carrier, _ = task.system.carrier(body.name)
-        source = rigid.system.body(carrier).all
-        target = slice(body.offset, body.offset + 3)
-        q[:, target], v[:, target], a[:, target] = rigid.q[:, source], rigid.v[:, source], rigid.a[:, source]
-    return _NominalMotion(task.system, times, q, v, a)
+    return _NominalMotion(task.system, times, *undeformed_motion(task.system, rigid.system, rigid.q, rigid.v, rigid.a))
 
 
 def _holding(system: System, mode: ActuationMode, kept: list[Response]) -> Array:
@@ -236,23 +229,6 @@ def _holding(system: System, mode: ActuationMode, kept: list[Response]) -> Array
     for row, response in zip(torques, kept, strict=True):
         row[active] = -response.mu[system.m :]
     return torques
-
-
-def _mass(body: BodyCoordinates) -> Array:
-    """Return the mass matrix of an undeformed body in its frame (M_rr ... M_ff of the theory with R = 1, u = 0)."""
-    s = body.integrals
-    M = np.eye(3 + body.nf)
-    M[:2, :2] *= s.m
-    M[:2, 2] = M[2, :2] = -s.S1[1], s.S1[0]
-    M[2, 2] = s.I0 + s.J
-    M[:2, 3:], M[3:, :2] = s.S2, s.S2.T
-    M[2, 3:] = M[3:, 2] = s.G1 + s.Jf
-    return M
-
-
-def _quarter(x: Array) -> Array:
-    """Return E x for vectors (k, 2), a rotation by a quarter turn."""
-    return np.column_stack([-x[:, 1], x[:, 0]])
 
 
 def _turned(system: System, values: Array, angles: Array) -> Array:

@@ -32,7 +32,7 @@ from paraflex.integrators import IntegrationOptions, Method, Solution, check_tim
 from paraflex.kernel.packed import Signals
 from paraflex.kinematics import ModelWithPaths
 from paraflex.mechanism import Mechanism, Start, TimeProfile
-from paraflex.mechanism.loads import InTime
+from paraflex.mechanism.loads import InTime, value_in_time
 from paraflex.mechanism.quantities import known
 from paraflex.validity import Validity, assess, implausible_results, large_rotations, warn, with_likely_cause
 
@@ -77,10 +77,7 @@ class MotionRun(Shown):
     def applied(self) -> Array:
         """Torques (k, motors) at the times of the solution [N m]."""
         t = self.solution.t
-        each = [
-            profile.evaluate(t)[0] if isinstance(profile, TimeProfile) else np.full(t.size, profile)
-            for profile in self.torques.values()
-        ]
+        each = [value_in_time(torque, t) for torque in self.torques.values()]
         return np.stack(each, axis=1) if each else np.zeros((t.size, 0))
 
     @cached_property

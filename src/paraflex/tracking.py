@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from enum import Enum
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 
@@ -136,11 +136,11 @@ class TrackingTask:
         """
         mechanism, desired = self.mechanism, self.motion.desired
         names = [motor.name for motor in mechanism.motors]
-        desired_position = desired.position if actual is None else desired.position[: len(actual)]
+        actual = desired.position if actual is None else actual
         return Driven(
             mode=mode,
-            desired=desired_position,
-            actual=desired_position if actual is None else actual,
+            desired=desired.position[: len(actual)],
+            actual=actual,
             acceleration=float(np.max(np.linalg.norm(desired.acceleration, axis=1))),
             peaks=dict(zip(names, np.max(np.abs(torques), axis=0).tolist(), strict=True)),
             units=dict(zip(names, mechanism.motor_units(), strict=True)),
@@ -353,7 +353,14 @@ def plan_tracking(
     InputError, AssemblyError, UnreachablePathError
         See `kinematics.follow_path`; a path that moves a sliding point off its beam, where `at_end` is "error".
     """
-    mechanism, path = _planned(mechanism, path)
+    source, mechanism = mechanism, Mechanism.from_source(mechanism)
+    if isinstance(path, str):
+        if isinstance(source, Mechanism):
+            raise InputError(
+                "a mechanism has no paths by name", field="path", value=path,
+                remedy="give the model that paraflex.load reads instead of its mechanism, or a path such as Polygon",
+            )  # fmt: skip
+        path = source.path(path)
     mechanism = standing(mechanism, assembly)
     end = path.duration if duration is None else duration
     check_times(end, samples)
@@ -425,62 +432,37 @@ def simulate(
     if after is not None:
         task = replace(task, after=after)
     options = choose(method, options)
-    title = options.method.title
     torques = task.torques(mode)
-    condition = actuation_condition(task.effort, torques.mode)
+    run_of = partial(
+        TrackingRun, task, torques, actuation_condition(task.effort, torques.mode), method=options.method.title
+    )
+    march = partial(integrate, options=options, samples=task.motion.t.size, on_progress=on_progress)
     try:
         if task.holds:
-            run = _drive_and_hold(task, torques, condition, options, on_progress)
+            run = _drive_and_hold(task, torques, run_of, march)
         else:
-            solution = _drive(task, torques, task.motion.t, options, on_progress)
-            run = TrackingRun(task, torques, condition, solution, title)
+            run = run_of(_drive(task, torques, task.motion.t, march))
     except IntegrationError as error:
         if not isinstance(error.partial, TrackingRun):
-            error.partial = TrackingRun(task, torques, condition, error.partial, title)
+            error.partial = run_of(error.partial)
         raise
     if warning:
         run.warn()
     return run
 
 
-def _planned(given: Mechanism | ModelWithPaths, path: Path | str) -> tuple[Mechanism, Path]:
-    """Return the mechanism and the path, which may be given by its name in a model."""
-    mechanism = Mechanism.from_source(given)
-    if not isinstance(path, str):
-        return mechanism, path
-    if isinstance(given, Mechanism):
-        raise InputError(
-            "a mechanism has no paths by name", field="path", value=path,
-            remedy="give the model that paraflex.load reads instead of its mechanism, or a path such as Polygon",
-        )  # fmt: skip
-    return mechanism, given.path(path)
-
-
-def _drive(
-    task: TrackingTask,
-    torques: FeedForward,
-    times: Array,
-    options: IntegrationOptions,
-    on_progress: Callable[[float], None] | None,
-) -> Solution:
+def _drive(task: TrackingTask, torques: FeedForward, times: Array, march: Callable[..., Solution]) -> Solution:
     signals, knots = pack_signals(task.mechanism, torques.signals, float(task.motion.t[-1]))
     stops = np.sort(np.concatenate([path_stops(torques.knots, task.mechanism), knots]))
     try:
-        return integrate(
-            task.system, signals, task.start, times, knots=stops, options=options, samples=task.motion.t.size,
-            on_progress=on_progress,
-        )  # fmt: skip
+        return march(task.system, signals, task.start, times, knots=stops)
     except IntegrationError as error:
         with_likely_cause(error, (task.whole or task).mechanism)
         raise
 
 
 def _drive_and_hold(
-    task: TrackingTask,
-    torques: FeedForward,
-    condition: Array,
-    options: IntegrationOptions,
-    on_progress: Callable[[float], None] | None,
+    task: TrackingTask, torques: FeedForward, run_of: Callable[..., TrackingRun], march: Callable[..., Solution]
 ) -> TrackingRun:
     """Drive along the path, then continue with the joints of the active motors locked."""
     times, end = task.motion.t, task.path.duration
@@ -488,10 +470,9 @@ def _drive_and_hold(
     until = times[:count]
     if count == 0 or until[-1] < end * (1.0 - _SAME_TIME):
         until = np.append(until, end)
-    driven = _drive(task, torques, until, options, on_progress)
-    title = options.method.title
+    driven = _drive(task, torques, until, march)
     if driven.status != "complete":
-        return TrackingRun(task, torques, condition, driven, title)
+        return run_of(driven)
     motors = [motor for motor in task.mechanism.motors if motor.name in torques.mode.motors]
     braked = brake(task.system, State(float(until[-1]), driven.q[-1], driven.v[-1]), [motor.joint for motor in motors])
     signals, knots = still_signals(braked.system.mechanism, float(times[-1]))
@@ -504,13 +485,10 @@ def _drive_and_hold(
         holding[:, columns] = braked.holding(held.multipliers)
         # The state at an event is one sample more than the times of the task.
         holding = np.concatenate([torques.evaluate(driven.t[:count]), holding[: held.t.size - bool(held.event)]])
-        return TrackingRun(task, torques, condition, solution, title, holding=holding)
+        return run_of(solution, holding=holding)
 
     try:
-        held = integrate(
-            braked.system, signals, braked.state, times[count:], knots=np.array(knots), options=options,
-            begun=driven, samples=times.size, on_progress=on_progress,
-        )  # fmt: skip
+        held = march(braked.system, signals, braked.state, times[count:], knots=np.array(knots), begun=driven)
     except IntegrationError as error:
         error.partial = whole(with_likely_cause(error, (task.whole or task).mechanism).partial)
         raise
@@ -523,8 +501,8 @@ def _start(system: System, motion: RigidMotion) -> State:
     return State(float(motion.t[0]), q, v)
 
 
-def undeformed_at(system: System, motion: RigidMotion, sample: int) -> tuple[Array, Array, Array]:
-    """Return coordinates (n,) and their two derivatives at a sample of a rigid motion, bodies undeformed."""
+def undeformed_at(system: System, motion: RigidMotion, sample: int | list[int]) -> tuple[Array, Array, Array]:
+    """Return coordinates (n,), or (k, n), and two derivatives at samples of a rigid motion, bodies undeformed."""
     return undeformed_motion(system, motion.system, motion.q[sample], motion.v[sample], motion.a[sample])
 
 

@@ -10,9 +10,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from paraflex.arrays import Array
+from paraflex.arrays import Array, Mask
 from paraflex.dynamics import acting_loads, joint_coordinate
 from paraflex.errors import ActuationError, Moment, SingularActuationError
 from paraflex.kernel.arrays import apart
@@ -43,7 +42,7 @@ class Effort:
     required: Array
     matrix: Array
 
-    def active(self, mode: ActuationMode) -> NDArray[np.bool_]:
+    def active(self, mode: ActuationMode) -> Mask:
         """Whether a mode drives each motor (motors,)."""
         return np.array([motor.name in mode.motors for motor in self.motion.mechanism.motors], dtype=bool)
 

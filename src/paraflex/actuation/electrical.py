@@ -97,16 +97,14 @@ def electrical(system: System, mechanism: Mechanism, run: Any) -> Electrical:
     commanded = applied if commanded is None else commanded[:k]
     motors, found = tuple(motor.name for motor in mechanism.motors), actuators_by_motor(mechanism)
     q, v = run.solution.q[:k], run.solution.v[:k]
-    out = {name: np.full((k, len(motors)), np.nan) for name in ("torque", "current", "voltage")}
-    rate = np.zeros((k, len(motors)))
+    torque, rate, current, voltage = np.full((4, k, len(motors)), np.nan)
     for m, motor in enumerate(mechanism.motors):
         rate[:, m] = joint_coordinate(system, motor.joint, q, v).rate
-        actuator = found.get(motor.name)
-        each = _of_motor(actuator, applied[:, m], commanded[:, m], rate[:, m])
-        out["torque"][:, m], out["current"][:, m], out["voltage"][:, m] = each
+        each = _of_motor(found.get(motor.name), applied[:, m], commanded[:, m], rate[:, m])
+        torque[:, m], current[:, m], voltage[:, m] = each
     known = [found.get(name) for name in motors]
     resistance = np.array([np.nan if one is None or one.resistance is None else one.resistance for one in known])
-    return Electrical(motors, run.solution.t[:k], rate=rate, resistance=resistance, **out)
+    return Electrical(motors, run.solution.t[:k], torque, rate, current, voltage, resistance)
 
 
 def _of_motor(actuator: Actuator | None, applied: Array, commanded: Array, rate: Array) -> tuple[Any, Any, Any]:

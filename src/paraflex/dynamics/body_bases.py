@@ -14,7 +14,7 @@ import scipy.linalg
 
 from paraflex.arrays import Numbers
 from paraflex.dynamics.constraints import Constraint
-from paraflex.dynamics.coordinates import BodyCoordinates, Marker, make_marker
+from paraflex.dynamics.coordinates import BodyCoordinates, Marker, PlacedBodies
 from paraflex.dynamics.held import held_modes, place_rows, slope_rows, static_shapes
 from paraflex.errors import InputError
 from paraflex.fem import ModalBasis, modal_basis
@@ -26,12 +26,7 @@ _DEPENDENT = 1e-10
 Rows = Callable[[Marker], Numbers]
 
 
-def interface_rows(
-    mechanism: Mechanism,
-    bodies: Sequence[BodyCoordinates],
-    constraints: Sequence[Constraint],
-    name: str,
-) -> Numbers:
+def interface_rows(placed: PlacedBodies, constraints: Sequence[Constraint], name: str) -> Numbers:
     """Return rows on (r, phi, u) of a body: positions and rotations of its points that members act on, each once.
 
     Rows for joints, prescribed motions, gears, springs, dampers and friction follow from their constraints. Motors,
@@ -39,10 +34,8 @@ def interface_rows(
 
     Parameters
     ----------
-    mechanism : Mechanism
-        Mechanism of the body.
-    bodies : sequence of BodyCoordinates
-        Coordinates of all bodies.
+    placed : PlacedBodies
+        Bodies of the mechanism.
     constraints : sequence of Constraint
         Constraints of the mechanism.
     name : str
@@ -53,12 +46,9 @@ def interface_rows(
     InputError
         A member slides along the body, which therefore has no fixed interface.
     """
-    acting = dict.fromkeys((ref.point, rows) for ref, rows in _acting(mechanism, constraints) if ref.body == name)
-    index = {body.name: i for i, body in enumerate(bodies)}
-    rows = [np.zeros((0, 3 + bodies[index[name]].nf))]
-    for point, of_marker in acting:
-        rows.append(of_marker(make_marker(mechanism, tuple(bodies), index, PointRef(name, point))))
-    return np.concatenate(rows)
+    acting = dict.fromkeys(one for one in _acting(placed.mechanism, constraints) if one[0].body == name)
+    none = np.zeros((0, 3 + placed.bodies[placed.index[name]].nf))
+    return np.concatenate([none, *(rows(placed.marker(ref)) for ref, rows in acting)])
 
 
 def _acting(mechanism: Mechanism, constraints: Sequence[Constraint]) -> Iterator[tuple[PointRef, Rows]]:
@@ -107,20 +97,14 @@ def is_reduced(mechanism: Mechanism, body: Body) -> bool:
 
 
 def reduced_body(
-    mechanism: Mechanism,
-    bodies: Sequence[BodyCoordinates],
-    constraints: Sequence[Constraint],
-    name: str,
-    like: ModalBasis | None = None,
+    placed: PlacedBodies, constraints: Sequence[Constraint], name: str, like: ModalBasis | None = None
 ) -> BodyCoordinates:
     """Return an undamped body in its reduced flexible coordinates.
 
     Parameters
     ----------
-    mechanism : Mechanism
-        Mechanism of the body, with its given bases.
-    bodies : sequence of BodyCoordinates
-        Bodies of the mechanism, each with all its coordinates, undamped.
+    placed : PlacedBodies
+        Mechanism with its given bases, and its bodies, each with all its coordinates, undamped.
     constraints : sequence of Constraint
         Constraints of the mechanism.
     name : str
@@ -133,13 +117,13 @@ def reduced_body(
     InputError
         Given shapes have another number of coordinates, or something slides along a body with Craig-Bampton shapes.
     """
-    body = next(one for one in bodies if one.name == name)
+    mechanism, body = placed.mechanism, placed.bodies[placed.index[name]]
     described = mechanism.body(name)
     assert not isinstance(described, RigidBody)
     if name in mechanism.bases:
         shapes = _vibrations(body, _given(body, np.array(mechanism.bases[name])))
     elif isinstance(described, FlexibleBeam) and described.reduction is ComponentModes.CRAIG_BAMPTON:
-        rows = interface_rows(mechanism, bodies, constraints, name)
+        rows = interface_rows(placed, constraints, name)
         held = held_modes(body, rows)[1][:, : described.modes]
         shapes = _vibrations(body, np.hstack([static_shapes(body, rows), held]))
     else:

@@ -6,7 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from paraflex.arrays import Array
-from paraflex.dynamics.joint_coordinates import joint_coordinate
+from paraflex.dynamics.following import driven_rows
+from paraflex.dynamics.joint_coordinates import joint_value
 from paraflex.dynamics.signals import moment_signals
 from paraflex.dynamics.sparse import sparse_mass
 from paraflex.dynamics.state import State, project_velocity
@@ -69,15 +70,12 @@ def brake(system: System, state: State, joints: Sequence[str]) -> BrakedSystem:
         A joint is moved by a prescribed motion.
     """
     mechanism = system.mechanism
-    names = [f"brake of {joint}" for joint in joints]
-    values = [float(joint_coordinate(system, joint, state.q[None]).value[0]) for joint in joints]
     locks = tuple(
-        PrescribedAngle(name, joint, HeldAngle(value)) for name, joint, value in zip(names, joints, values, strict=True)
+        PrescribedAngle(f"brake of {joint}", joint, HeldAngle(joint_value(system, joint, state.q))) for joint in joints
     )
     locked = build_system(replace(mechanism, prescribed=(*mechanism.prescribed, *locks)), system)
     v = project_velocity(locked, moment_signals(locked.mechanism, state.time), state.time, state.q, state.v)
     lost = state.v - v
     energy = 0.5 * float(lost @ (sparse_mass(system, state.q) @ lost))
-    found = {row.rpartition(" ")[0]: i for i, row in enumerate(locked.rows)}
-    rows = tuple(found[name] for name in names)
+    rows = tuple(row for _, row in driven_rows(locked))[len(mechanism.prescribed) :]
     return BrakedSystem(locked, replace(state, v=v), energy, rows)

@@ -160,11 +160,12 @@ def terms_by_joint(constraints: Sequence[Constraint]) -> dict[str, list[RowTerm]
     return found
 
 
-def row_order(mechanism: Mechanism, index: dict[str, int]) -> list[Constraint]:
+def row_order(mechanism: Mechanism) -> list[Constraint]:
     """Order the constraints for a small envelope of the Schur complement (reverse Cuthill-McKee)."""
     constraints = _constraints(mechanism)
     if not constraints:
         return []
+    index = {body.name: i for i, body in enumerate(mechanism.bodies)}
     touched = [
         (i, index[ref.body])
         for i, constraint in enumerate(constraints)

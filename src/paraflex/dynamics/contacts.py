@@ -18,9 +18,8 @@ from __future__ import annotations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from paraflex.arrays import Array
+from paraflex.arrays import Array, Indices
 from paraflex.dynamics.coordinates import BodyCoordinates, element_at, transverse_pieces, transverse_rows
 from paraflex.dynamics.inertia_moments import inertia_moments
 from paraflex.dynamics.joint_coordinates import place_along_beam
@@ -93,7 +92,7 @@ class Contacts(NamedTuple):
         nearest = np.where(np.real(place) < 0.0, 0.0, self.beam.length)
         return np.where(off, nearest, place), np.where(off | np.isnan(force), 0.0, force)
 
-    def inside(self, x: Array, element: NDArray[np.int64]) -> Array:
+    def inside(self, x: Array, element: Indices) -> Array:
         """Return positions (s,) moved slightly into their elements, on their side of a node."""
         nodes = self.beam.mesh.nodes
         return x + _INSIDE * (0.5 * (nodes[element] + nodes[element + 1]) - x)
@@ -108,7 +107,7 @@ class Contacts(NamedTuple):
         """Return the moments (k, s) of the contact forces at positions x (k, s)."""
         return np.einsum("ksc,kc->ks", self.exact(x[:, :, None], load.place[:, None, :]), load.force)
 
-    def between(self, x: Array, place: Array) -> tuple[NDArray[np.int64], Array]:
+    def between(self, x: Array, place: Array) -> tuple[Indices, Array]:
         """Return per position the index of the preceding station of x (s,), and the fraction of the way to the next."""
         nodes = self.beam.mesh.nodes
         count, element = len(x) // len(self.stiffness), element_at(nodes, place)

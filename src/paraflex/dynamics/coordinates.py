@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
-from paraflex.arrays import Array
+from paraflex.arrays import Array, Indices, Numbers
 from paraflex.dynamics.shapes import BodyShape, PointShape, beam_lumps, body_shape
 from paraflex.errors import InputError
 from paraflex.fem import (
@@ -19,7 +19,7 @@ from paraflex.fem import (
     modal_basis,
     node_weights,
 )
-from paraflex.fem.element import transverse_shape
+from paraflex.fem.eigen import is_definite
 from paraflex.mechanism import Body, FlexibleBeam, Geometry, Mechanism, PointRef, RigidBody
 
 GROUND_INDEX = -1
@@ -61,6 +61,18 @@ class BodyCoordinates:
     def mesh(self) -> BeamMesh | None:
         """Mesh of a flexible beam; None for any other body."""
         return self.shape.mesh
+
+    @property
+    def mass_matrix(self) -> Numbers:
+        """Mass matrix (3 + nf, 3 + nf) of the undeformed body in its frame; modes have unit mass."""
+        mass = self.integrals.mass_matrix
+        mass[3:, 3:] = np.eye(self.nf)
+        return mass
+
+    @property
+    def stiffness(self) -> Numbers:
+        """Elastic stiffness (3 + nf,) of each coordinate: omega^2 for modal ones, zero for rigid ones."""
+        return np.concatenate([np.zeros(3), self.modes.omega**2])
 
     @property
     def nf(self) -> int:
@@ -156,54 +168,54 @@ def body_coordinates(body: Body, geometry: Geometry, like: ModalBasis | None = N
         if not isinstance(body, RigidBody) and not body.flexible:
             integrals = integrals.without_flexibility()
         modes = modal_basis(integrals)
+        if like is not None:
+            modes = modes.like(like, integrals.Mff)
+        integrals = integrals.in_basis(modes.vectors)
+        # The inertia about the centre of mass may be rounding against that about the origin.
+        if not is_definite(np.real(integrals.mass_matrix), _SINGULAR):
+            raise np.linalg.LinAlgError("not positive definite")
     except np.linalg.LinAlgError as error:
-        raise _not_definite(body.name) from error
-    if like is not None:
-        modes = modes.like(like, integrals.Mff)
-    integrals = integrals.in_basis(modes.vectors)
-    _check_mass(body.name, integrals)
+        raise InputError(
+            "its mass matrix is not positive definite, or only by rounding", field=f"body.{body.name}",
+            remedy="check inertia, centre of mass, section, material and lumped masses for values many orders of "
+            "magnitude apart",
+        ) from error  # fmt: skip
     points = None
     if geometry is Geometry.SECOND_ORDER and integrals.nf and isinstance(body, FlexibleBeam):
         points = mass_points(body.mesh, body.spans, beam_lumps(body), integrals.D)
     return BodyCoordinates(body.name, 0, integrals, modes, shape, points, np.zeros((integrals.nf, integrals.nf)))
 
 
-def _check_mass(name: str, body: ShapeIntegrals) -> None:
-    """Check that the mass matrix of a whole undeformed body is positive definite beyond rounding.
+@dataclass(frozen=True)
+class PlacedBodies:
+    """A mechanism, and the coordinates of its bodies.
 
-    It is not if the inertia about its centre of mass is rounding against the inertia about its origin.
+    Attributes
+    ----------
+    mechanism : Mechanism
+        Mechanism in the frames of its parts, with actuators included.
+    bodies : tuple of BodyCoordinates
+        Coordinates of each body.
     """
-    rigid = [[body.m, 0.0, -body.S1[1]], [0.0, body.m, body.S1[0]], [-body.S1[1], body.S1[0], body.I0 + body.J]]
-    mass = np.real(np.array(rigid))
-    if body.nf:
-        coupling = np.real(np.vstack([body.S2, body.G1 + body.Jf]))
-        mass = np.block([[mass, coupling], [coupling.T, np.real(body.Mff)]])
-    if np.all(np.isfinite(mass)) and np.all(np.diag(mass) > 0.0):
-        size = np.sqrt(np.diag(mass))
-        if np.linalg.eigvalsh(mass / size / size[:, None])[0] > _SINGULAR:
-            return
-    raise _not_definite(name)
 
+    mechanism: Mechanism
+    bodies: tuple[BodyCoordinates, ...]
 
-def _not_definite(name: str) -> InputError:
-    return InputError(
-        "its mass matrix is not positive definite, or only by rounding", field=f"body.{name}",
-        remedy="check inertia, centre of mass, section, material and lumped masses for values many orders of "
-        "magnitude apart",
-    )  # fmt: skip
+    @cached_property
+    def index(self) -> dict[str, int]:
+        """Index of each body by name."""
+        return {body.name: i for i, body in enumerate(self.bodies)}
 
-
-def make_marker(
-    mechanism: Mechanism, bodies: tuple[BodyCoordinates, ...], index: dict[str, int], ref: PointRef
-) -> Marker:
-    """Return the material point of a name; for the ground, a fixed position without a body."""
-    if ref.on_ground:
-        return Marker(GROUND_INDEX, np.array(mechanism.ground[ref.point]) * 1.0, np.zeros((2, 0)), np.zeros(0))
-    i = index[ref.body]
-    body = bodies[i]
-    if body.mesh is None:
-        return _point_marker(i, body, body.shape.points[ref.point])
-    return node_marker(i, body, body.mesh.points[ref.point])
+    def marker(self, ref: PointRef) -> Marker:
+        """Return the material point of a name; for the ground, a fixed position without a body."""
+        if ref.on_ground:
+            place = np.array(self.mechanism.ground[ref.point]) * 1.0
+            return Marker(GROUND_INDEX, place, np.zeros((2, 0)), np.zeros(0))
+        i = self.index[ref.body]
+        body = self.bodies[i]
+        if body.mesh is None:
+            return _point_marker(i, body, body.shape.points[ref.point])
+        return node_marker(i, body, body.mesh.points[ref.point])
 
 
 def end_markers(index: int, body: BodyCoordinates) -> tuple[Marker, ...]:
@@ -237,13 +249,12 @@ def transverse_pieces(body: BodyCoordinates) -> Array:
     # Six values determine a quintic.
     z, pieces = np.linspace(0.0, 1.0, 6), []
     for e, length in enumerate(np.diff(mesh.nodes)):
-        rows = mesh.scatter(e, transverse_shape(z * length, length))
-        powers = np.linalg.solve(np.vander(z, increasing=True), rows)
+        powers = np.linalg.solve(np.vander(z, increasing=True), mesh.transverse_rows(e, z * length))
         pieces.append(powers / (length ** np.arange(6))[:, None] @ body.integrals.D)
     return np.array(pieces)
 
 
-def element_at(nodes: Array, place: Array) -> NDArray[np.int64]:
+def element_at(nodes: Array, place: Array) -> Indices:
     """Return the index of the element at positions of any shape along a beam; the end elements beyond its ends."""
     return np.searchsorted(np.real(nodes[1:-1]), np.real(place), side="right")
 
@@ -254,7 +265,7 @@ def transverse_rows(nodes: Array, pieces: Array, place: Array, derivative: int) 
     return piece_rows(pieces, element, place - nodes[element], derivative)
 
 
-def piece_rows(pieces: Array, element: NDArray[np.int64], z: Array, derivative: int = 0) -> Array:
+def piece_rows(pieces: Array, element: Indices, z: Array, derivative: int = 0) -> Array:
     """Evaluate polynomials of elements (see `transverse_pieces`) or a derivative at distances z from first nodes."""
     coefficients = np.polynomial.polynomial.polyder(np.eye(pieces.shape[1]), derivative)
     powers = [sum(c * z**p for p, c in enumerate(column) if c) + 0.0 * z for column in coefficients.T]

@@ -29,40 +29,34 @@ from collections.abc import Iterator
 import numpy as np
 
 from paraflex.arrays import Array, Numbers
-from paraflex.dynamics.coordinates import BodyCoordinates, Marker, make_marker
+from paraflex.dynamics.coordinates import Marker, PlacedBodies
 from paraflex.dynamics.held import held_modes, place_rows, slope_rows
-from paraflex.mechanism import GROUND, Mechanism, RigidBody, stiffness_proportional
+from paraflex.mechanism import GROUND, RigidBody, stiffness_proportional
 
 # An entry of the damping matrix below this fraction of the damping of its two modes is rounding.
 _ROUNDED_ENTRY = 1e-9
 
 
-def damping_matrix(
-    mechanism: Mechanism, bodies: tuple[BodyCoordinates, ...], index: dict[str, int], name: str
-) -> Array:
+def damping_matrix(placed: PlacedBodies, name: str) -> Array:
     """Return the damping matrix of a body in its modal coordinates (nf, nf) [1/s].
 
     A matrix that is diagonal to rounding is returned exactly diagonal.
 
     Parameters
     ----------
-    mechanism : Mechanism
-        Mechanism of the body, whose joints hold it.
-    bodies : tuple of BodyCoordinates
-        Coordinates of all bodies.
-    index : dict
-        Index of each body by name.
+    placed : PlacedBodies
+        Bodies of the mechanism, whose joints hold the body.
     name : str
         Name of the body.
     """
-    body, described = bodies[index[name]], mechanism.body(name)
+    body, described = placed.bodies[placed.index[name]], placed.mechanism.body(name)
     if isinstance(described, RigidBody) or described.damping is None or body.nf == 0:
         return np.zeros((body.nf, body.nf))
     squares = body.modes.omega**2
     beta = stiffness_proportional(described.damping)
     if beta is not None:
         return np.diag(beta * squares)
-    held = np.array(list(_conditions(mechanism, bodies, index, name))).reshape(-1, 3 + body.nf)
+    held = np.array(list(_conditions(placed, name))).reshape(-1, 3 + body.nf)
     omega, modes = held_modes(body, held)
     # Held modes are (nf, k), in coordinates with the stiffness diag(squares).
     lost = described.damping.coefficients(omega) / omega**2
@@ -79,10 +73,9 @@ def _without_rounding(matrix: Numbers) -> Numbers:
     return np.where(small, 0.0, 0.5 * (matrix + matrix.T))
 
 
-def _conditions(
-    mechanism: Mechanism, bodies: tuple[BodyCoordinates, ...], index: dict[str, int], name: str
-) -> Iterator[Numbers]:
+def _conditions(placed: PlacedBodies, name: str) -> Iterator[Numbers]:
     """Yield the conditions of a body's joints as rows on (r, phi, u), undeformed: see the module docstring."""
+    mechanism = placed.mechanism
     pinned: list[Marker] = []
     across: list[Marker] = []
     driven = {prescribed.joint for prescribed in mechanism.prescribed}
@@ -90,7 +83,7 @@ def _conditions(
         for here, there in ((joint.a, joint.b), (joint.b, joint.a)):
             if here.body != name or GROUND not in mechanism.reached(there.body, past=name):
                 continue
-            marker = make_marker(mechanism, bodies, index, here)
+            marker = placed.marker(here)
             turns_with = "angle" in joint.holds
             along_itself = joint.slides and not turns_with and here is joint.a
             if turns_with or (joint.name in driven and not joint.slides):

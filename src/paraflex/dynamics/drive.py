@@ -9,7 +9,7 @@ from itertools import combinations
 import numpy as np
 
 from paraflex.arrays import Array
-from paraflex.dynamics.joint_coordinates import joint_coordinate
+from paraflex.dynamics.joint_coordinates import joint_rows
 from paraflex.dynamics.sparse import Saddle, sparse_jacobian, sparse_mass
 from paraflex.dynamics.state import State
 from paraflex.dynamics.system import System
@@ -61,8 +61,7 @@ def driven_freedoms(system: System, state: State, freedoms: int) -> DrivenFreedo
     """
     mechanism = system.mechanism
     motors = [motor.name for motor in mechanism.motors]
-    rows = [joint_coordinate(system, motor.joint, state.q[None]).rows[0] for motor in mechanism.motors]
-    S = np.array(rows).reshape(-1, system.n)
+    S = joint_rows(system, [motor.joint for motor in mechanism.motors], state.q)
     solver = Saddle(sparse_mass(system, state.q), sparse_jacobian(system, state.q))
     effect = S @ np.array([solver.solve(column)[0] for column in S]).reshape(-1, system.n).T
     modes = {mode.name: _rank(effect, [motors.index(name) for name in mode.motors]) for mode in mechanism.modes}

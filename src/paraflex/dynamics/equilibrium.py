@@ -9,16 +9,12 @@ import scipy
 
 from paraflex.arguments import checked_arguments
 from paraflex.arrays import Array
-from paraflex.dynamics.inputs import inputs_of
 from paraflex.dynamics.joint_coordinates import joint_coordinate
-from paraflex.dynamics.signals import moment_signals
 from paraflex.dynamics.sparse import sparse_jacobian, stiffness_diagonal
 from paraflex.dynamics.state import State
 from paraflex.dynamics.stiffness import RestingForces, pose_stiffness
 from paraflex.dynamics.system import System
 from paraflex.errors import AssemblyError, Moment
-from paraflex.kernel.packed import CONSTRAINT, INDEX_1
-from paraflex.kernel.stage import equations
 from paraflex.limits import solvable
 
 _MAX_ITERATIONS = 50
@@ -96,17 +92,15 @@ def moving_equilibrium(system: System, start: State, motion: Motion) -> Array:
     AssemblyError
         No equilibrium is found near the start.
     """
-    return _find(system, start, (), motion)
+    try:
+        return _find(system, start, (), motion)
+    except AssemblyError as error:
+        raise AssemblyError(_NO_MOVING_EQUILIBRIUM, error.moment, error.partial, _SLOWER_DRIVES) from None
 
 
 def _find(system: System, start: State, held: Sequence[str], motion: Motion | None) -> Array:
     solve = _sparse_equilibrium if system.n + system.m > _MOST_DENSE else _dense_equilibrium
-    try:
-        return solve(system, start, held, motion)
-    except AssemblyError as error:
-        if motion is None:
-            raise
-        raise AssemblyError(_NO_MOVING_EQUILIBRIUM, error.moment, error.partial, _SLOWER_DRIVES) from None
+    return solve(system, start, held, motion)
 
 
 def _dense_equilibrium(system: System, start: State, held: Sequence[str], motion: Motion | None) -> Array:
@@ -123,7 +117,7 @@ def _dense_equilibrium(system: System, start: State, held: Sequence[str], motion
         by_force[body.flexible] = scale[body.flexible] / energy
     for _ in range(_MAX_ITERATIONS):
         if motion is not None:
-            residual.v, residual.a = motion(z[:n])
+            residual.forces.v, residual.forces.a = motion(z[:n])
         value = by_force * residual(z)
         jacobian = np.column_stack(
             [(by_force * residual(z + _DIFFERENCE * unit) - value) / _DIFFERENCE for unit in np.diag(scale)]
@@ -143,9 +137,8 @@ def _dense_equilibrium(system: System, start: State, held: Sequence[str], motion
 def _sparse_equilibrium(system: System, start: State, held: Sequence[str], motion: Motion | None) -> Array:
     """Find the equilibrium with sparse matrices; springs at joints are stiffness here, not multipliers."""
     forces, elastic = RestingForces(system, start.time), stiffness_diagonal(system)
-    signals = moment_signals(system.mechanism, start.time)
     kept, _ = _joints(system, held, start.q)
-    rigid = np.nonzero(system.packed.rows["kind"] == CONSTRAINT)[0]
+    rigid = np.nonzero(system.constrained)[0]
     q, mu = start.q.copy(), np.zeros(rigid.size + len(held))
     for _ in range(_MAX_ITERATIONS):
         if motion is not None:
@@ -155,7 +148,7 @@ def _sparse_equilibrium(system: System, start: State, held: Sequence[str], motio
         lam = forces.compliant(q)
         lam[rigid] = mu[: rigid.size]
         f = forces(q, lam)[0] + elastic * q + holding.T @ mu[rigid.size :]
-        phi, _ = system.constraints(signals, start.time, q)
+        phi, _ = system.constraints(forces.signals, start.time, q)
         K = scipy.sparse.csr_matrix(pose_stiffness(system, start.time, q, lam) + scipy.sparse.diags(elastic))
         C = scipy.sparse.csr_matrix(scipy.sparse.vstack([sparse_jacobian(system, q)[rigid], holding]))
         try:
@@ -196,29 +189,26 @@ def _joints(system: System, held: Sequence[str], q: Array) -> tuple[Array, Array
 
 
 class _Residual:
-    """Residuals of forces, constraints and held joints at (q, multipliers, torques), in motion at `v` and `a` (n,)."""
+    """Residuals of forces, constraints and held joints at (q, multipliers, torques), in the motion of `forces`."""
 
     def __init__(self, system: System, start: State, held: Sequence[str]) -> None:
-        mechanism = system.mechanism
-        self.system, self.time, self.held = system, start.time, held
+        self.system, self.held = system, held
         self.kept = _joints(system, held, start.q)[0]
-        self.signals = moment_signals(mechanism, start.time)
-        self.workspace, self.torques = system.workspace(), np.zeros(inputs_of(mechanism).acting)
-        self.v, self.a = np.zeros((2, system.n))
+        self.forces = RestingForces(system, start.time, beams=True)
         self.largest_effort = 0.0
         # The scale of friction rows is set separately and has no default.
-        self.workspace.compliance[:] = system.packed.rows["compliance"]
+        self.forces.workspace.compliance[:] = system.packed.rows["compliance"]
 
     def __call__(self, z: Array) -> Array:
-        system, ws = self.system, self.workspace
+        system, forces = self.system, self.forces
         q, lam, torque = np.split(z, [system.n, system.n + system.m])
         q, lam = np.ascontiguousarray(q), np.ascontiguousarray(lam)
-        equations(system.packed, self.signals, self.time, INDEX_1, q, self.v, self.a, lam, self.torques, ws)
-        phi, _ = system.constraints(self.signals, self.time, q)
+        f, _ = forces(q, lam)
+        phi, _ = system.constraints(forces.signals, forces.time, q)
         # Rows of springs, dampers and friction have no second derivatives in them.
-        closed = np.where(system.packed.rows["kind"] == CONSTRAINT, phi, ws.rows)
+        closed = np.where(system.constrained, phi, forces.workspace.rows)
         value, rows = _joints(system, self.held, q)
         holding = rows.T @ torque
         efforts = (np.abs(system.row_units * lam), np.abs(system.units * holding))
         self.largest_effort = max(np.max(part, initial=0.0) for part in efforts)
-        return np.concatenate([ws.f + holding, closed, value - self.kept])
+        return np.concatenate([f + holding, closed, value - self.kept])

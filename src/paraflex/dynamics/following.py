@@ -15,7 +15,7 @@ from paraflex.dynamics.projection import assemble, closed, constraint_change
 from paraflex.dynamics.rank import DENSE_ROWS
 from paraflex.dynamics.system import System
 from paraflex.errors import AssemblyError, Moment
-from paraflex.kernel.packed import CONSTRAINT, Signals
+from paraflex.kernel.packed import Signals
 from paraflex.mechanism import PrescribedAngle
 
 # Weight of stiffness in `link_metric` when loops are closed: links move, their deflections stay as given.
@@ -106,13 +106,10 @@ def _away(system: System, signals: Signals, t: float, q: Array) -> Array:
 
 def _ways(system: System, signals: Signals, t: float, q: Array, away: Array) -> Iterator[Array]:
     """Yield poses from which to follow drives: the shorter way to their start, the whole way, the other way round."""
-    shorter = _turned(system, signals, t, q, away)
-    yield shorter
-    if not np.array_equal(shorter, q):
-        yield q
-    other = _turned(system, signals, t, q, away, other_way=True)
-    if not (np.array_equal(other, q) or np.array_equal(other, shorter)):
-        yield other
+    ways = (_turned(system, signals, t, q, away), q, _turned(system, signals, t, q, away, other_way=True))
+    for k, way in enumerate(ways):
+        if not any(np.array_equal(way, earlier) for earlier in ways[:k]):
+            yield way
 
 
 def _turned(system: System, signals: Signals, t: float, q: Array, away: Array, *, other_way: bool = False) -> Array:
@@ -169,11 +166,10 @@ def _follow(system: System, signals: Signals, t: float, q: Array) -> tuple[Array
 
 def _side(system: System, q: Array) -> float:
     """Return the sign of det Phi_q of a fully driven rigid mechanism, which changes where branches meet; else zero."""
-    rows = system.packed.rows["kind"] == CONSTRAINT
     rigid = [body.offset + k for body in system.bodies for k in range(3)]
-    if np.sum(rows) != len(rigid) or len(rigid) > DENSE_ROWS:
+    if system.n_constraints != len(rigid) or len(rigid) > DENSE_ROWS:
         return 0.0
-    return float(np.linalg.slogdet(system.jacobian(q)[np.ix_(rows, rigid)])[0])
+    return float(np.linalg.slogdet(system.jacobian(q)[system.constrained][:, rigid])[0])
 
 
 def _sharpened(system: System, q: Array) -> Array:
@@ -181,17 +177,14 @@ def _sharpened(system: System, q: Array) -> Array:
 
     The gap of the loops is quadratic along the direction in which they hardly open; the least singular value is linear.
     """
-    rows = system.packed.rows["kind"] == CONSTRAINT
-    if not 0 < np.sum(rows) <= min(DENSE_ROWS, system.n):
+    rows = system.constrained
+    if not 0 < system.n_constraints <= min(DENSE_ROWS, system.n):
         return q
-
-    def jacobian(q: Array) -> Array:
-        return system.jacobian(q)[rows] * system.units / system.row_units[rows, None]
-
-    left, sizes, right = np.linalg.svd(jacobian(q), full_matrices=False)
+    left, sizes, right = np.linalg.svd(system.dimensionless_jacobian(q)[rows], full_matrices=False)
     if sizes[-1] > _SINGULAR * sizes[0]:
         return q
     u, v = left[:, -1], right[-1]
-    slope = (u @ jacobian(q + _PROBE * system.units * v) @ v - sizes[-1]) / _PROBE
+    beside = system.dimensionless_jacobian(q + _PROBE * system.units * v)[rows]
+    slope = (u @ beside @ v - sizes[-1]) / _PROBE
     move = -sizes[-1] / slope if slope else np.inf
     return q + move * system.units * v if abs(move) <= _SINGULAR else q

@@ -31,14 +31,7 @@ def held_modes(body: BodyCoordinates, held: Numbers) -> tuple[Numbers, Numbers]:
 
     `held` has one row per condition on its coordinates (r, phi, u); all conditions are zero together.
     """
-    s, nf = body.integrals, body.nf
-    mass = np.eye(3 + nf, dtype=np.result_type(s.S2, held))
-    mass[:2, :2] *= s.m
-    mass[2, 2] = s.I0 + s.J
-    mass[:2, 2] = mass[2, :2] = -s.S1[1], s.S1[0]
-    mass[:2, 3:], mass[2, 3:] = s.S2, s.G1 + s.Jf
-    mass[3:, :2], mass[3:, 2] = s.S2.T, s.G1 + s.Jf
-    stiffness = np.diag(np.concatenate([np.zeros(3), body.modes.omega**2]))
+    mass, stiffness = body.mass_matrix, np.diag(body.stiffness)
     sizes = 1.0 / np.sqrt(np.real(np.diag(mass)))
     basis = sizes[:, None] * null_space(held * sizes)
     values, vectors = eigenpairs(basis.T @ stiffness @ basis, basis.T @ mass @ basis)

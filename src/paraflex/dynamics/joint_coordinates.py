@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 
 from paraflex.arrays import Array
 from paraflex.dynamics.coordinates import GROUND_INDEX, Marker
-from paraflex.dynamics.points import marker_place, marker_position
+from paraflex.dynamics.points import cross, marker_place, marker_position
 from paraflex.dynamics.system import System
 from paraflex.mechanism import Joint, PointRef
 
@@ -36,18 +37,26 @@ def joint_coordinate(system: System, name: str, q: Array, v: Array | None = None
     carrier = axis_marker(system, joint)
     theta, turn = _marker_angle(system, carrier, q)
     theta = theta + joint.direction
-    e = np.column_stack([np.cos(theta), np.sin(theta)])
+    e = unit_vectors(theta)
     (pa, rows_a), (pb, rows_b) = marker_place(system, carrier, q), marker_place(system, system.marker(joint.b), q)
     d = pb - pa
-    lever = e[:, 0] * d[:, 1] - e[:, 1] * d[:, 0]
-    rows = np.einsum("ki,kij->kj", e, rows_b - rows_a) + lever[:, None] * turn
+    rows = np.einsum("ki,kij->kj", e, rows_b - rows_a) + cross(e, d)[:, None] * turn
     return JointCoordinate(np.sum(e * d, axis=1), np.sum(rows * v, axis=1), rows)
+
+
+def joint_value(system: System, name: str, q: Array) -> float:
+    """Return the coordinate of a joint at q (n,) [rad, m]."""
+    return float(joint_coordinate(system, name, q[None]).value[0])
+
+
+def joint_rows(system: System, names: Sequence[str], q: Array) -> Array:
+    """Return the derivatives (joints, n) of the coordinates of joints at q (n,)."""
+    return np.array([joint_coordinate(system, name, q[None]).rows[0] for name in names]).reshape(-1, system.n)
 
 
 def value_text(system: System, name: str, q: Array) -> str:
     """Format the coordinate of a joint at q (n,), with its unit."""
-    value = float(joint_coordinate(system, name, q[None]).value[0])
-    return f"{value:.6g} {'m' if system.mechanism.slides(name) else 'rad'}"
+    return f"{joint_value(system, name, q):.6g} {'m' if system.mechanism.slides(name) else 'rad'}"
 
 
 def place_along_beam(system: System, name: str, q: Array) -> Array:
@@ -60,6 +69,11 @@ def axis_marker(system: System, joint: Joint) -> Marker:
     """Return the carrier of a joint's axis: the material at point a; for a sliding joint the body's frame there."""
     marker = system.marker(joint.a)
     return marker.on_frame if joint.follows_beam else marker
+
+
+def unit_vectors(angle: Array) -> Array:
+    """Return the unit vectors (k, 2) at angles (k,)."""
+    return np.column_stack([np.cos(angle), np.sin(angle)])
 
 
 def axis_angle(system: System, joint: Joint, q: Array) -> Array:

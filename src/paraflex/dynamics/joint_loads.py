@@ -11,33 +11,48 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from paraflex.arrays import Array
+from paraflex.arrays import Array, Indices, Numbers
 from paraflex.dynamics.constraints import RowTerm, Term
 from paraflex.dynamics.coordinates import transverse_pieces, transverse_rows
 from paraflex.dynamics.following import driven_rows
-from paraflex.dynamics.joint_coordinates import axis_angle, line_direction
-from paraflex.dynamics.points import marker_place, point_motion
+from paraflex.dynamics.joint_coordinates import axis_angle, line_direction, unit_vectors
+from paraflex.dynamics.points import cross, marker_place, point_motion
 from paraflex.dynamics.rank import NO_PART, dependence
 from paraflex.dynamics.system import System
 from paraflex.kernel.packed import ANGLE, POINT
 from paraflex.mechanism import Joint
 
 
-class JointLoads(NamedTuple):
-    """Forces and moments that the first body of each joint exerts on its second.
+class Loads(NamedTuple):
+    """Forces and moments over time.
 
     Attributes
     ----------
-    force : (k, joints, 2) array
-        Force at the joint's point on the second body, in the ground frame [N].
-    moment : (k, joints) array
-        Moment about that point, positive anticlockwise [N m].
+    force : (k, 2) or (k, joints, 2) array
+        Force in the ground frame [N]; of a joint, on the joint's point of the second body.
+    moment : (k,) or (k, joints) array
+        Moment about the origin of the ground frame, or about that point, positive anticlockwise [N m].
     """
 
     force: Array
     moment: Array
+
+
+class LoadComponents(NamedTuple):
+    """Properties of the load components of joints and of all drives: errors, or whether they are determined.
+
+    Attributes
+    ----------
+    force, moment : arrays
+        Those of the forces (k, joints, 2) and moments (k, joints) in joints; errors are (joints,) for both [N, N m].
+    drive : array
+        Those of the torques or forces of prescribed motions (k, drives); errors are (drives,) [N m, N].
+    """
+
+    force: Numbers
+    moment: Numbers
+    drive: Numbers
 
 
 class JointParts(NamedTuple):
@@ -73,7 +88,7 @@ def joint_parts(system: System, name: str) -> JointParts:
     return JointParts(system.row_terms.get(name, ()), motors)
 
 
-def joint_loads(system: System, names: Sequence[str], q: Array, multipliers: Array, torques: Array) -> JointLoads:
+def joint_loads(system: System, names: Sequence[str], q: Array, multipliers: Array, torques: Array) -> Loads:
     """Return forces and moments in joints: of constraints, motors, springs, dampers, friction and gears.
 
     All arrays may have complex steps.
@@ -98,12 +113,10 @@ def joint_loads(system: System, names: Sequence[str], q: Array, multipliers: Arr
     force, moment = np.zeros((len(q), len(names), 2), kind), np.zeros((len(q), len(names)), kind)
     for i, name in enumerate(names):
         force[:, i], moment[:, i] = load_in(system, name, joint_parts(system, name), q, multipliers, torques)
-    return JointLoads(force, moment)
+    return Loads(force, moment)
 
 
-def load_in(
-    system: System, name: str, parts: JointParts, q: Array, multipliers: Array, torques: Array
-) -> tuple[Array, Array]:
+def load_in(system: System, name: str, parts: JointParts, q: Array, multipliers: Array, torques: Array) -> Loads:
     """Return force (k, 2) and moment (k,) in one joint, as `joint_loads`; all arguments may have complex steps."""
     joint, kind = system.mechanism.joint(name), np.result_type(q, multipliers, torques)
     force, moment = np.zeros((len(q), 2), kind), np.zeros(len(q), kind)
@@ -117,31 +130,13 @@ def load_in(
             force -= load * _direction(system, term, q)
     for torque in torques[:, list(parts.motors)].T:
         if joint.slides:
-            force += torque[:, None] * _unit(axis_angle(system, joint, q))
+            force += torque[:, None] * unit_vectors(axis_angle(system, joint, q))
         else:
             moment += torque
-    return force, moment
+    return Loads(force, moment)
 
 
-class UndeterminedLoads(NamedTuple):
-    """Load components that are shared arbitrarily among redundant constraints.
-
-    Attributes
-    ----------
-    force, moment : (k, joints, 2) and (k, joints) arrays of bool
-        Components of the forces, and moments, in joints.
-    drive : (k, drives) array of bool
-        Torques or forces of prescribed motions.
-    """
-
-    force: NDArray[np.bool_]
-    moment: NDArray[np.bool_]
-    drive: NDArray[np.bool_]
-
-
-def undetermined_loads(
-    system: System, names: Sequence[str], q: Array, acting: NDArray[np.int64] | None = None
-) -> UndeterminedLoads:
+def undetermined_loads(system: System, names: Sequence[str], q: Array, acting: Indices | None = None) -> LoadComponents:
     """Find the loads of joints and of all drives that redundant rows share arbitrarily.
 
     Rows are redundant in all poses (k, n) or in none: the search ends at the first pose without redundant rows.
@@ -149,7 +144,7 @@ def undetermined_loads(
     """
     drives = system.mechanism.prescribed
     shapes = (len(names), 2), (len(names),), (len(drives),)
-    found = UndeterminedLoads(*(np.zeros((len(q), *shape), dtype=bool) for shape in shapes))
+    found = LoadComponents(*(np.zeros((len(q), *shape), dtype=bool) for shape in shapes))
     arms = np.where([system.mechanism.slides(one.joint) for one in drives], system.size, 1.0)
     for k, pose in enumerate(q):
         free = dependence(system, pose, acting=acting).self_stresses(system.row_units)
@@ -169,25 +164,7 @@ def drive_torques(system: System, multipliers: Array) -> Array:
     return -multipliers[:, np.array([row for _, row in driven_rows(system)], int)]
 
 
-class LoadErrors(NamedTuple):
-    """Estimated errors of the loads of joints and drives.
-
-    Attributes
-    ----------
-    force : (joints,) array
-        Error of the constraint forces of each joint [N].
-    moment : (joints,) array
-        Error of its constraint moments [N m].
-    drive : (drives,) array
-        Error of the torque [N m] or force [N] of each prescribed motion.
-    """
-
-    force: Array
-    moment: Array
-    drive: Array
-
-
-def load_errors(system: System, names: Sequence[str], errors: Array) -> LoadErrors:
+def load_errors(system: System, names: Sequence[str], errors: Array) -> LoadComponents:
     """Return estimated errors of the loads of joints and of all drives, from those of the multipliers (m,)."""
     force, moment = np.zeros(len(names)), np.zeros(len(names))
     for i, name in enumerate(names):
@@ -196,26 +173,11 @@ def load_errors(system: System, names: Sequence[str], errors: Array) -> LoadErro
                 moment[i] += abs(term.weight) * errors[rows[0]]
             else:
                 force[i] += abs(term.weight) * float(np.linalg.norm(errors[rows]))
-    return LoadErrors(force, moment, np.abs(drive_torques(system, errors[None])[0]))
+    return LoadComponents(force, moment, np.abs(drive_torques(system, errors[None])[0]))
 
 
-class FrameLoad(NamedTuple):
-    """Shaking force and moment: the load that a mechanism exerts on the ground.
-
-    Attributes
-    ----------
-    force : (k, 2) array
-        Shaking force [N].
-    moment : (k,) array
-        Shaking moment about the origin of the ground frame, positive anticlockwise [N m].
-    """
-
-    force: Array
-    moment: Array
-
-
-def frame_load(system: System, places: Array, loads: JointLoads, q: Array, v: Array) -> FrameLoad:
-    """Sum the loads of joints and springs between points on the ground.
+def frame_load(system: System, places: Array, loads: Loads, q: Array, v: Array) -> Loads:
+    """Return shaking force and moment, the load of a mechanism on the ground, from joints and springs at its points.
 
     Parameters
     ----------
@@ -223,7 +185,7 @@ def frame_load(system: System, places: Array, loads: JointLoads, q: Array, v: Ar
         System of the mechanism.
     places : (k, joints, 2) array
         Positions of the joints of `loads`, on their second bodies [m].
-    loads : JointLoads
+    loads : Loads
         Loads of the first joints of the system's mechanism, all joints on the ground among them.
     q, v : (k, n) arrays
         Coordinates and velocities.
@@ -233,7 +195,7 @@ def frame_load(system: System, places: Array, loads: JointLoads, q: Array, v: Ar
     for i, joint in enumerate(mechanism.joints[: places.shape[1]]):
         sign = float(joint.b.on_ground) - float(joint.a.on_ground)
         force += sign * loads.force[:, i]
-        moment += sign * (loads.moment[:, i] + _cross(places[:, i], loads.force[:, i]))
+        moment += sign * (loads.moment[:, i] + cross(places[:, i], loads.force[:, i]))
     for spring in mechanism.linear_springs:
         if spring.a.on_ground or spring.b.on_ground:
             fixed, moving = (spring.a, spring.b) if spring.a.on_ground else (spring.b, spring.a)
@@ -244,12 +206,8 @@ def frame_load(system: System, places: Array, loads: JointLoads, q: Array, v: Ar
             rate = np.sum(along * there.velocity, axis=1)
             pull = (spring.stiffness * (distance - spring.length) + spring.damping * rate)[:, None] * along
             force += pull
-            moment += _cross(np.broadcast_to(at, pull.shape), pull)
-    return FrameLoad(force, moment)
-
-
-def _cross(a: Array, b: Array) -> Array:
-    return a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]
+            moment += cross(np.broadcast_to(at, pull.shape), pull)
+    return Loads(force, moment)
 
 
 def _direction(system: System, term: Term, q: Array) -> Array:
@@ -258,10 +216,10 @@ def _direction(system: System, term: Term, q: Array) -> Array:
     if term.carrier == "nothing":
         return line_direction(system, joint, q)
     along = axis_angle(system, joint, q)
-    direction = _unit(along + term.direction - joint.direction)
+    direction = unit_vectors(along + term.direction - joint.direction)
     if term.carrier == "track":
         # Normal to the deformed beam at the position of the point.
-        direction = direction - _track_slope(system, joint, q)[:, None] * _unit(along)
+        direction = direction - _track_slope(system, joint, q)[:, None] * unit_vectors(along)
     return direction
 
 
@@ -270,10 +228,6 @@ def _track_slope(system: System, joint: Joint, q: Array) -> Array:
     body = system.body(joint.a.body)
     assert body.mesh is not None
     away = marker_place(system, system.marker(joint.b), q)[0] - q[:, body.position]
-    x = np.sum(away * _unit(q[:, body.angle]), axis=1)
+    x = np.sum(away * unit_vectors(q[:, body.angle]), axis=1)
     shapes = transverse_rows(body.mesh.nodes, transverse_pieces(body), x, 1)
     return np.sum(shapes * q[:, body.flexible], axis=1)
-
-
-def _unit(angle: Array) -> Array:
-    return np.column_stack([np.cos(angle), np.sin(angle)])

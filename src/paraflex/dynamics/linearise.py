@@ -16,9 +16,8 @@ import scipy
 
 from paraflex.arguments import checked_arguments
 from paraflex.arrays import Array
-from paraflex.dynamics.joint_coordinates import joint_coordinate
 from paraflex.dynamics.rank import dependence
-from paraflex.dynamics.sparse import Saddle, sparse_jacobian, sparse_mass, stiffness_diagonal
+from paraflex.dynamics.sparse import Saddle, sparse_jacobian, sparse_joint_rows, sparse_mass, stiffness_diagonal
 from paraflex.dynamics.state import State
 from paraflex.dynamics.stiffness import RestingForces, pose_stiffness
 from paraflex.dynamics.system import System
@@ -103,10 +102,10 @@ def natural_frequencies(
         Number of the lowest vibrations; all by default, or ten for more than 600 coordinates.
     """
     M, J = sparse_mass(system, state.q), sparse_jacobian(system, state.q)
-    efforts = _joint_rows(system, state.q, [*held, *torque_at])
-    lam, _, acceleration = forces_at_rest(system, state, Inertia(M, J, efforts))
+    efforts = sparse_joint_rows(system, dict.fromkeys([*held, *torque_at]), state.q)
+    lam, _, acceleration = forces_at_rest(system, state, M, J, efforts)
     elastic, other = stiffness_diagonal(system), pose_stiffness(system, state.time, state.q, lam)
-    C = scipy.sparse.csr_matrix(scipy.sparse.vstack([J, _joint_rows(system, state.q, held)]))
+    C = scipy.sparse.csr_matrix(scipy.sparse.vstack([J, sparse_joint_rows(system, dict.fromkeys(held), state.q)]))
     typical = typical_square(elastic, other, M)
     K = scipy.sparse.csr_matrix(other + scipy.sparse.diags(elastic))
     if system.n <= DENSE_COORDINATES:
@@ -138,20 +137,6 @@ def slowest_deflection(system: System, q: Array) -> float:
     return float(np.sqrt(np.min(squares[squares > _FREE * typical], initial=np.inf)))
 
 
-def _joint_rows(system: System, q: Array, joints: Sequence[str]) -> Sparse:
-    """Return the derivatives (joints, n) of the joints' angles or travels, each once."""
-    rows = [scipy.sparse.csr_matrix(joint_coordinate(system, joint, q[None]).rows) for joint in dict.fromkeys(joints)]
-    return scipy.sparse.csr_matrix(scipy.sparse.vstack([scipy.sparse.csr_matrix((0, system.n)), *rows]))
-
-
-class Inertia(NamedTuple):
-    """Mass (n, n), Phi_q (m, n), and derivatives (joints, n) of joint coordinates, as forces at rest require."""
-
-    mass: Sparse
-    constraints: Sparse
-    joints: Sparse
-
-
 class RestForces(NamedTuple):
     """Forces that hold a mechanism at a pose.
 
@@ -170,14 +155,21 @@ class RestForces(NamedTuple):
     acceleration: float
 
 
-def forces_at_rest(system: System, state: State, inertia: Inertia) -> RestForces:
-    """Return the constraint forces at a pose at rest, held by motors at the joints of `inertia`."""
+def forces_at_rest(system: System, state: State, M: Sparse, constraints: Sparse, joints: Sparse) -> RestForces:
+    """Return the constraint forces at a pose at rest, held by motors at joints.
+
+    Parameters
+    ----------
+    system, state
+        System, and the state at the pose.
+    M, constraints, joints : (n, n), (m, n) and (joints, n) sparse matrices
+        Mass matrix, Phi_q, and derivatives of the coordinates of the joints with motors.
+    """
     forces, lam = RestingForces(system, state.time), np.zeros(system.m)
     springs = forces.springs
     lam[springs] = forces(state.q, lam)[1] / system.packed.rows["compliance"][springs]
     f = forces(state.q, lam)[0] + stiffness_diagonal(system) * state.q
-    M, rows = inertia.mass, scipy.sparse.csr_matrix(scipy.sparse.vstack([inertia.constraints, inertia.joints]))
-    a, mu = Saddle(M, rows).solve(-f)
+    a, mu = Saddle(M, scipy.sparse.csr_matrix(scipy.sparse.vstack([constraints, joints]))).solve(-f)
     acceleration = float(np.sqrt(max(a @ (M @ a), 0.0) / system.total_mass))
     return RestForces(lam + mu[: system.m], -mu[system.m :], acceleration)
 

@@ -8,13 +8,14 @@ deflection under forces converges with the third. A beam clamped by a weld is to
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 
-from paraflex.dynamics.coordinates import BodyCoordinates
+from paraflex.dynamics.coordinates import BodyCoordinates, PlacedBodies
 from paraflex.dynamics.system import System
-from paraflex.mechanism import AppliedTorque, Mechanism, PointRef, RigidBody, grouped, joints_named
+from paraflex.mechanism import AppliedTorque, Mechanism, PointRef, grouped, joints_named
 
 # Missing fractions of a rotation below this are not reported.
 _MISSED = 0.05
@@ -48,16 +49,9 @@ def missing_rotations(system: System) -> list[MissingRotation]:
     """
     found: dict[PointRef, MissingRotation] = {}
     for point, cause in _moments(system.mechanism):
-        described = system.mechanism.body(point.body)
         body = system.body(point.body)
-        chosen = body.name in system.mechanism.bases
-        if (
-            isinstance(described, RigidBody)
-            or chosen
-            or not body.nf
-            or body.nf == body.shape.integrals.nf
-            or point in found
-        ):
+        chosen, reduced = body.name in system.mechanism.bases, 0 < body.nf < body.shape.integrals.nf
+        if chosen or not reduced or point in found:
             continue
         part = _missed(body, system, point)
         if part > _MISSED:
@@ -67,11 +61,8 @@ def missing_rotations(system: System) -> list[MissingRotation]:
 
 def _missed(body: BodyCoordinates, system: System, point: PointRef) -> float:
     whole = body.shape.integrals
-    if body.mesh is None:
-        own = body.shape.points[point.point].slope
-    else:
-        own = body.mesh.shape_at_node(body.mesh.points[point.point])[1]
-    slope = own @ whole.D
+    unreduced = PlacedBodies(system.mechanism, (replace(body, integrals=whole, points=None),))
+    slope = unreduced.marker(point).slope
     turn = float(slope @ np.linalg.solve(whole.K, slope))
     kept = float(np.sum((system.marker(point).slope / body.modes.omega) ** 2))
     return 1.0 - kept / turn if turn > 0.0 else 0.0

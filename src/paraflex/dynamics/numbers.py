@@ -6,9 +6,8 @@ from collections.abc import Iterator
 from typing import Any, TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
-from paraflex.arrays import Array
+from paraflex.arrays import Array, Records
 
 R = TypeVar("R", bound=tuple[Any, ...])
 
@@ -20,11 +19,9 @@ def numbers_of(record: tuple[Any, ...]) -> Array:
 
 def with_numbers(record: R, numbers: Array) -> R:
     """Return the named tuple with other numbers, ordered as by `numbers_of`; integers are unchanged."""
-    fields, at = [], 0
-    for field in record:
-        new, at = _replaced(field, numbers, at)
-        fields.append(new)
-    return type(record)(*fields)
+    ends = np.cumsum([np.size(part) for part in _parts(record)])
+    parts = iter(np.split(numbers, ends))
+    return type(record)(*(_replaced(field, parts) for field in record))
 
 
 def same_layout(a: tuple[Any, ...], b: tuple[Any, ...]) -> bool:
@@ -43,18 +40,17 @@ def _parts(record: tuple[Any, ...]) -> Iterator[Any]:
                 yield field
 
 
-def _replaced(field: Any, numbers: Array, at: int) -> tuple[Any, int]:
+def _replaced(field: Any, parts: Iterator[Array]) -> Any:
     if isinstance(field, float):
-        return float(numbers[at]), at + 1
+        return next(parts).item()
     if not isinstance(field, np.ndarray) or (field.dtype.names is None and field.dtype.kind != "f"):
-        return field, at
+        return field
     if field.dtype.names is None:
-        return numbers[at : at + field.size].reshape(field.shape).copy(), at + field.size
+        return next(parts).reshape(field.shape).copy()
     new = field.copy()
     for name in _floating(field):
-        new[name] = numbers[at : at + field.size]
-        at += field.size
-    return new, at
+        new[name] = next(parts)
+    return new
 
 
 def _same(x: Any, y: Any) -> bool:
@@ -67,6 +63,6 @@ def _same(x: Any, y: Any) -> bool:
     return x.dtype.kind == "f" or bool(np.array_equal(x, y))
 
 
-def _floating(records: NDArray[np.void]) -> list[str]:
+def _floating(records: Records) -> list[str]:
     names = records.dtype.names or ()
     return [name for name in names if records.dtype[name].kind in "fc"]

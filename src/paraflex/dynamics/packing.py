@@ -7,11 +7,10 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from paraflex.arrays import Array
+from paraflex.arrays import Array, Records
 from paraflex.dynamics.constraints import Constraint, Term, coordinate
-from paraflex.dynamics.coordinates import BodyCoordinates, Marker, make_marker, transverse_pieces
+from paraflex.dynamics.coordinates import BodyCoordinates, Marker, PlacedBodies, transverse_pieces
 from paraflex.dynamics.inputs import inputs_of
 from paraflex.dynamics.scale import mechanism_size
 from paraflex.kernel.packed import (
@@ -37,12 +36,10 @@ from paraflex.mechanism import Joint, Mechanism, PointRef, TimeProfile
 _OF_SPRINGS = ("stiffness", "length", "damping")
 
 
-def pack_system(
-    mechanism: Mechanism, bodies: tuple[BodyCoordinates, ...], index: dict[str, int], constraints: list[Constraint]
-) -> tuple[PackedSystem, tuple[str, ...]]:
+def pack_system(placed: PlacedBodies, constraints: list[Constraint]) -> tuple[PackedSystem, tuple[str, ...]]:
     """Return the records and arrays for the kernels, and the name of every constraint row."""
-    size = mechanism_size(bodies)
-    packer = _Packer(mechanism, bodies, index, size)
+    mechanism, bodies = placed.mechanism, placed.bodies
+    packer = _Packer(placed)
     for constraint in constraints:
         packer.add_constraint(constraint)
     for k, motor in zip(inputs_of(mechanism).motors, mechanism.motors, strict=True):
@@ -84,7 +81,7 @@ def pack_system(
         spans=_flat([_padded(p.weights.T) for p in points]),
         inertias=_flat([_padded(np.stack([p.x, p.mass, p.inertia])) for p in points]),
         total_mass=np.sum([body.integrals.m for body in bodies]).item(),
-        size=size,
+        size=packer.size,
         gravity=np.array(mechanism.gravity) * 1.0,
     )
     return packed, tuple(packer.labels)
@@ -93,26 +90,25 @@ def pack_system(
 class _Packer:
     """Builder of a system's records, joint by joint."""
 
-    def __init__(
-        self, mechanism: Mechanism, bodies: tuple[BodyCoordinates, ...], index: dict[str, int], size: float
-    ) -> None:
-        self.mechanism, self.bodies, self.index, self.size = mechanism, bodies, index, size
+    def __init__(self, placed: PlacedBodies) -> None:
+        self.placed, self.size = placed, mechanism_size(placed.bodies)
+        self.ground, self.index = placed.mechanism.ground, placed.index
         self.markers: list[Marker] = []
-        self.ports: list[list[dict]] = [[] for _ in bodies]
-        self.motor_sides: list[list[dict]] = [[] for _ in bodies]
+        self.ports: list[list[dict]] = [[] for _ in placed.bodies]
+        self.motor_sides: list[list[dict]] = [[] for _ in placed.bodies]
         self.axes: list[dict] = []
         self.tracks: list[int] = []
         self.rows: list[dict] = []
         self.labels: list[str] = []
 
     def add_marker(self, ref: PointRef) -> int:
-        self.markers.append(make_marker(self.mechanism, self.bodies, self.index, ref))
+        self.markers.append(self.placed.marker(ref))
         return len(self.markers) - 1
 
     def end(self, ref: PointRef, end: str) -> dict[str, float]:
         """Return one end of a line or an axis: a marker, or a position on the ground."""
         if ref.on_ground:
-            x, y = self.mechanism.ground[ref.point]
+            x, y = self.ground[ref.point]
             return {end: -1, f"{end}x": x, f"{end}y": y}
         return {end: self.add_marker(ref), f"{end}x": 0.0, f"{end}y": 0.0}
 
@@ -140,7 +136,7 @@ class _Packer:
             if ref.on_ground:
                 if term.kind == POINT:
                     for coordinate in range(2):
-                        self.rows[row + coordinate]["ground"] += weight * self.mechanism.ground[ref.point][coordinate]
+                        self.rows[row + coordinate]["ground"] += weight * self.ground[ref.point][coordinate]
                 continue
             if axis < 0:
                 marker, parts = self.add_marker(ref), rows
@@ -176,14 +172,13 @@ class _Packer:
 
 def _tracks(bodies: list[BodyCoordinates]) -> tuple[list[dict], Array, Array]:
     """Return records, breaks and coefficients of the deflections of beams that points slide on."""
-    breaks = [body.mesh.nodes for body in bodies if body.mesh is not None]
-    pieces = [transverse_pieces(body) for body in bodies]
-    starts = zip(*(np.cumsum([0, *(part.size for part in parts)]).tolist() for parts in (breaks, pieces)), strict=True)
-    records = [
-        {"first": first, "pieces": len(part), "coefficients": coefficients}
-        for (first, coefficients), part in zip(starts, pieces, strict=False)
-    ]
-    return records, np.concatenate([np.zeros(0), *breaks]), np.concatenate([np.zeros(0), *map(np.ravel, pieces)])
+    records, breaks, coefficients = [], np.zeros(0), np.zeros(0)
+    for body in bodies:
+        assert body.mesh is not None
+        pieces = transverse_pieces(body)
+        records.append({"first": breaks.size, "pieces": len(pieces), "coefficients": coefficients.size})
+        breaks, coefficients = np.append(breaks, body.mesh.nodes), np.append(coefficients, pieces)
+    return records, breaks, coefficients
 
 
 def _load_records(mechanism: Mechanism, packer: _Packer) -> list[dict[str, float]]:
@@ -239,12 +234,7 @@ def _columns(bodies: tuple[BodyCoordinates, ...], markers: list[Marker]) -> list
     return [_padded(np.vstack(parts).T) for parts in rows]
 
 
-def _mass_points(body: BodyCoordinates) -> tuple[int, int]:
-    """Return the numbers of mass points and of the Gauss points whose slopes shorten them."""
-    return (0, 0) if body.points is None else body.points.weights.shape
-
-
-def records(dtype: np.dtype, values: list[dict[str, Any]]) -> NDArray[np.void]:
+def records(dtype: np.dtype, values: list[dict[str, Any]]) -> Records:
     """Convert dictionaries by field to records, zero for missing fields; complex if any number is."""
     blank = dict.fromkeys(dtype.names or (), 0)
     rows = [tuple((blank | value).values()) for value in values]
@@ -253,63 +243,59 @@ def records(dtype: np.dtype, values: list[dict[str, Any]]) -> NDArray[np.void]:
     return np.array(rows, dtype=dtype)
 
 
-def _body_records(bodies, ports, motor_sides, columns) -> NDArray[np.void]:
+def _body_records(bodies, ports, motor_sides, columns) -> Records:
     values: list[dict] = []
     start: Counter[str] = Counter()
     for body, body_ports, body_motors, matrix in zip(bodies, ports, motor_sides, columns, strict=True):
-        s, parts, (points, slopes) = body.integrals, sum(port["parts"] for port in body_ports), _mass_points(body)
-        own = _own_sizes(body, parts) | {"port": len(body_ports), "motor": len(body_motors), "columns": matrix.size}
+        s, nf, size, full = body.integrals, body.nf, 3 + body.nf, _is_full(body)
+        # Mass points, and the Gauss points whose slopes shorten them.
+        points, slopes = (0, 0) if body.points is None else body.points.weights.shape
+        parts = sum(port["parts"] for port in body_ports)
+        # The lanes of the body's Jacobian rows have three more for its rigid coordinates.
+        stride, pitch, lanes = padded(nf), padded(points), padded(parts + 3)
+        # Length of the body's part of each array, by the field that holds its start.
+        own = {
+            "flex": nf,
+            "square": nf**2,
+            "products": 2 * nf * stride,
+            "damping": _coupled_damping(body).size,
+            "block": parts * lanes,
+            "jac": size * lanes,
+            "places": 3 * nf * pitch,
+            "spans": slopes * pitch,
+            "inertias": 3 * pitch,
+            "dense": size**2 if full else 0,
+            "inverse": size * padded(size) if full else 0,
+            "port": len(body_ports),
+            "motor": len(body_motors),
+            "columns": matrix.size,
+        }
         starts = {name: start[name] for name in own}
         start.update(own)
-        values.append(
-            starts
-            | {f"{name}_end": start[name] for name in ("port", "motor")}
-            | {
-                "offset": body.offset,
-                "nf": body.nf,
-                "width": matrix.shape[1],
-                "stride": padded(body.nf),
-                "damping": starts["damping"] if own["damping"] else -1,
-                "parts": parts,
-                "lanes": _lanes(parts),
-                "points": points,
-                "slopes": slopes,
-                "pitch": padded(points),
-                "full": int(_is_full(body)),
-                "m": s.m,
-                "S1x": s.S1[0],
-                "S1y": s.S1[1],
-                "I0": s.I0 + s.J,
-            }
-        )
+        numbers = {
+            "offset": body.offset,
+            "nf": nf,
+            "width": matrix.shape[1],
+            "stride": stride,
+            "damping": starts["damping"] if own["damping"] else -1,
+            "parts": parts,
+            "lanes": lanes,
+            "points": points,
+            "slopes": slopes,
+            "pitch": pitch,
+            "full": int(full),
+            "port_end": start["port"],
+            "motor_end": start["motor"],
+            "m": s.m,
+            "S1x": s.S1[0],
+            "S1y": s.S1[1],
+            "I0": s.I0 + s.J,
+        }
+        values.append(starts | numbers)
     return records(BODY, values)
 
 
-def _lanes(parts: int) -> int:
-    """Return the number of lanes of a body's Jacobian rows, with three more for its rigid coordinates."""
-    return padded(parts + 3)
-
-
-def _own_sizes(body: BodyCoordinates, parts: int) -> dict[str, int]:
-    """Return the length of a body's part of each array, by the field that holds its start."""
-    size, full = 3 + body.nf, _is_full(body)
-    points, slopes = _mass_points(body)
-    return {
-        "flex": body.nf,
-        "square": body.nf**2,
-        "products": 2 * body.nf * padded(body.nf),
-        "damping": _coupled_damping(body).size,
-        "block": parts * _lanes(parts),
-        "jac": size * _lanes(parts),
-        "places": 3 * body.nf * padded(points),
-        "spans": slopes * padded(points),
-        "inertias": 3 * padded(points),
-        "dense": size**2 if full else 0,
-        "inverse": size * padded(size) if full else 0,
-    }
-
-
-def _marker_records(markers: list[Marker]) -> NDArray[np.void]:
+def _marker_records(markers: list[Marker]) -> Records:
     values, shape, bending = [], 0, 0
     column: dict[int, int] = {}
     for marker in markers:
@@ -330,7 +316,7 @@ def _marker_records(markers: list[Marker]) -> NDArray[np.void]:
     return records(MARKER, values)
 
 
-def _port_records(ports) -> NDArray[np.void]:
+def _port_records(ports) -> Records:
     values = []
     for body_ports in ports:
         local = 0

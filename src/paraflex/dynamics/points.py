@@ -54,6 +54,16 @@ def marker_place(system: System, marker: Marker, q: Array) -> tuple[Array, Array
     return position, rows
 
 
+def quarter_turn(x: Array) -> Array:
+    """Return E x for vectors (k, 2), a rotation by a quarter turn."""
+    return np.column_stack([-x[:, 1], x[:, 0]])
+
+
+def cross(a: Array, b: Array) -> Array:
+    """Return the cross products (...) of vectors (..., 2)."""
+    return a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]
+
+
 def marker_motion(system: System, marker: Marker, q: Array, v: Array, a: Array) -> PointMotion:
     """Return the motion of a material point of a body for coordinates (k, n) and their derivatives.
 
@@ -66,9 +76,6 @@ def marker_motion(system: System, marker: Marker, q: Array, v: Array, a: Array) 
     def turned(x: Array) -> Array:
         return np.hstack([c * x[:, :1] - s * x[:, 1:], s * x[:, :1] + c * x[:, 1:]])
 
-    def quarter(x: Array) -> Array:
-        return np.column_stack([-x[:, 1], x[:, 0]])
-
     u, du, ddu = q[:, body.flexible], v[:, body.flexible], a[:, body.flexible]
     local, rate, second = marker.place(u), du @ marker.N.T, ddu @ marker.N.T
     if marker.bending is not None:
@@ -77,8 +84,8 @@ def marker_motion(system: System, marker: Marker, q: Array, v: Array, a: Array) 
         second[:, 0] -= np.sum(ddu * bu + du * bdu, axis=1)
     return PointMotion(
         q[:, body.position] + turned(local),
-        v[:, body.position] + turned(w * quarter(local) + rate),
-        a[:, body.position] + turned(dw * quarter(local) - w**2 * local + 2.0 * w * quarter(rate) + second),
+        v[:, body.position] + turned(w * quarter_turn(local) + rate),
+        a[:, body.position] + turned(dw * quarter_turn(local) - w**2 * local + 2.0 * w * quarter_turn(rate) + second),
     )
 
 
@@ -131,5 +138,4 @@ def _across(stations: Array) -> Array:
     x, y = arms[:, -1:, 0], arms[:, -1:, 1]
     # Roots and products only, no norm or modulus: these are analytic, as a complex step requires.
     length = np.sqrt(x**2 + y**2)
-    length = np.where(length == 0.0, np.nan, length)
-    return (x * arms[:, :, 1] - y * arms[:, :, 0]) / length
+    return cross(arms[:, -1:], arms) / np.where(length == 0.0, np.nan, length)

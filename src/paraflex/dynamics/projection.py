@@ -10,15 +10,14 @@ from collections.abc import Callable
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
-from paraflex.arrays import Array
+from paraflex.arrays import Array, Mask
 from paraflex.dynamics.inputs import inputs_of
 from paraflex.dynamics.rank import DENSE_ROWS, Dependence, constraint_jacobian, dependence, involved, joint_of_row
 from paraflex.dynamics.sparse import Saddle, elastic_stiffness, sparse_mass
 from paraflex.dynamics.system import System
 from paraflex.errors import InconsistentConstraintsError, Moment
-from paraflex.kernel.packed import CONSTRAINT, INDEX_1, Signals
+from paraflex.kernel.packed import INDEX_1, Signals
 from paraflex.kernel.stage import equations
 
 Sparse = scipy.sparse.csr_matrix
@@ -48,7 +47,7 @@ def assemble(
     q: Array,
     change_at: Callable[[Array], LeastChange],
     *,
-    free: NDArray[np.bool_] | None = None,
+    free: Mask | None = None,
     longest: float = math.inf,
     offset: Array | float = 0.0,
 ) -> tuple[Array, Array]:
@@ -158,7 +157,7 @@ def constraint_change(
     damping: float = 0.0,
     *,
     every_spring: bool = False,
-    free: NDArray[np.bool_] | None = None,
+    free: Mask | None = None,
 ) -> LeastChange:
     """Return `least_change` in `link_metric` with the rows Phi_q, for all coordinates or the free ones (n,)."""
     metric = link_metric(system, q, stiffness, every_spring=every_spring)
@@ -179,7 +178,7 @@ def second_rates(system: System, signals: Signals, t: float, q: Array, v: Array,
     """Return Phi'' (m,) at accelerations (n,); zero in the rows of springs and dampers."""
     workspace, torques = system.workspace(), np.zeros(inputs_of(system.mechanism).acting)
     equations(system.packed, signals, t, INDEX_1, q, v, a, np.zeros(system.m), torques, workspace)
-    return np.where(system.packed.rows["kind"] == CONSTRAINT, workspace.rows, 0.0)
+    return np.where(system.constrained, workspace.rows, 0.0)
 
 
 def joint_gaps(system: System, phi: Array) -> dict[str, float]:
@@ -191,9 +190,10 @@ def joint_gaps(system: System, phi: Array) -> dict[str, float]:
     return {name: gap for name, gap in sorted(gaps.items(), key=lambda item: -item[1]) if gap >= 0.1 * largest}
 
 
-def gap_unit(system: System, phi: Array) -> str:
-    """Return the unit of the largest number among constraint rows (m,)."""
-    return row_unit(system.rows[int(np.argmax(np.abs(phi)))])
+def gap_texts(system: System, phi: Array) -> tuple[str, str]:
+    """Return the largest residual of joints, gears and drives with its unit, and the names of those furthest open."""
+    gaps, largest = joint_gaps(system, phi), system.rows[int(np.argmax(np.abs(phi)))]
+    return f"{max(gaps.values()):.3g} {row_unit(largest)}", " and ".join(list(gaps)[:NAMED])
 
 
 def row_unit(row: str) -> str:

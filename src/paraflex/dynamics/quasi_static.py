@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 from typing import NamedTuple
 
@@ -11,14 +11,14 @@ import numpy as np
 
 from paraflex.arrays import Array
 from paraflex.dynamics.equilibrium import largest_move, moving_equilibrium, static_equilibrium
-from paraflex.dynamics.joint_coordinates import joint_coordinate
+from paraflex.dynamics.joint_coordinates import joint_coordinate, joint_value
 from paraflex.dynamics.projection import LeastChange, constraint_change, project, second_rates
 from paraflex.dynamics.rank import dependence
 from paraflex.dynamics.signals import moment_signals
 from paraflex.dynamics.state import VELOCITY_STIFFNESS, State
 from paraflex.dynamics.system import System, build_system
 from paraflex.mechanism import Load, PrescribedAngle, TimeProfile
-from paraflex.mechanism.profiles import HeldAngle
+from paraflex.mechanism.profiles import HeldAngle, SampledAngle
 
 # Motion of the mechanism for a central difference [sizes of the mechanism, rad].
 _DIFFERENCE_MOVE = 1e-3
@@ -31,23 +31,14 @@ class JointMotion(NamedTuple):
     acceleration: float = 0.0
 
 
-@dataclass(frozen=True)
-class DrivenAngle:
-    """Angle [rad] or travel [m] with its rate and acceleration at a time [s], continued with constant acceleration."""
-
-    time: float
-    value: float
-    motion: JointMotion
-    knots: tuple[float, ...] = ()
-
-    def evaluate(self, t: Array) -> tuple[Array, Array, Array]:
-        """Return value, rate and acceleration at times t."""
-        s, (rate, acceleration) = t - self.time, self.motion
-        return (
-            self.value + rate * s + 0.5 * acceleration * s**2,
-            rate + acceleration * s,
-            np.full(t.shape, acceleration),
-        )  # fmt: skip
+def _accelerating(time: float, value: float, motion: JointMotion) -> SampledAngle:
+    """Return the profile with a value, rate and acceleration at a time [s], continued with constant acceleration."""
+    rate, acceleration = motion
+    return SampledAngle(
+        lambda t: value + rate * (t - time) + 0.5 * acceleration * (t - time) ** 2,
+        lambda t: rate + acceleration * (t - time),
+        lambda t: np.full(t.shape, acceleration),
+    )
 
 
 def joint_motions(system: System, q: Array, v: Array, a: Array, joints: Iterable[str]) -> dict[str, JointMotion]:
@@ -100,10 +91,8 @@ def balanced_state(system: System, start: State, driven: Mapping[str, JointMotio
     prescribed = {one.joint: one for one in system.mechanism.prescribed}
     driven = {joint: motion for joint, motion in driven.items() if joint not in prescribed}
     now = np.array([start.time])
-    rates = [one.profile.evaluate(now)[1][0] for one in prescribed.values()] + [
-        motion.rate for motion in driven.values()
-    ]
-    if not np.any(rates):
+    rates = [one.profile.evaluate(now)[1][0] for one in prescribed.values()]
+    if not np.any([*rates, *(motion.rate for motion in driven.values())]):
         return static_equilibrium(system, start, list(driven))
     drives = _driven(system, start, driven)
     if not _prescribes_all(drives, start):
@@ -154,9 +143,8 @@ def _driven(system: System, start: State, driven: Mapping[str, JointMotion]) -> 
         replace(prescribed, profile=_smooth(prescribed.profile, start.time))
         for prescribed in system.mechanism.prescribed
     )
-    values = {name: float(joint_coordinate(system, name, start.q[None]).value[0]) for name in driven}
     more = tuple(
-        PrescribedAngle(f"drive of {name}", name, DrivenAngle(start.time, values[name], motion))
+        PrescribedAngle(f"drive of {name}", name, _accelerating(start.time, joint_value(system, name, start.q), motion))
         for name, motion in driven.items()
     )
     loads = tuple(_smooth_load(load, start.time) for load in system.mechanism.loads)
@@ -168,9 +156,9 @@ def _smooth_load(load: Load, time: float) -> Load:
     return replace(load, **{load.kind: tuple(parts) if len(parts) > 1 else parts[0]})
 
 
-def _smooth(profile: TimeProfile, time: float) -> DrivenAngle:
+def _smooth(profile: TimeProfile, time: float) -> SampledAngle:
     value, rate, acceleration = (float(x[0]) for x in profile.evaluate(np.array([time])))
-    return DrivenAngle(time, value, JointMotion(rate, acceleration))
+    return _accelerating(time, value, JointMotion(rate, acceleration))
 
 
 def _prescribes_all(drives: System, start: State) -> bool:

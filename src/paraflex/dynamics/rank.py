@@ -6,13 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
-from paraflex.arrays import Array
+from paraflex.arrays import Array, Indices
 from paraflex.dynamics.sparse import body_masses, sparse_jacobian
 from paraflex.dynamics.system import System
 from paraflex.kernel.linear import factor_system
-from paraflex.kernel.packed import CONSTRAINT
 
 # A constraint row with an independent part smaller than this fraction of the largest is redundant.
 DEPENDENT = 1e-9
@@ -36,8 +34,8 @@ class Dependence:
         Coefficients by which each dropped row of Phi_q is a combination of the kept ones.
     """
 
-    kept: NDArray[np.int64]
-    dropped: NDArray[np.int64]
+    kept: Indices
+    dropped: Indices
     coefficients: Array
 
     @property
@@ -45,7 +43,7 @@ class Dependence:
         """Rank of the constraint Jacobian."""
         return self.kept.size
 
-    def sources(self, k: int) -> NDArray[np.int64]:
+    def sources(self, k: int) -> Indices:
         """Return the row numbers of which the k-th dropped row is a combination."""
         part = np.abs(self.coefficients[:, k])
         return self.kept[part > NO_PART * max(1.0, part.max(initial=0.0))]
@@ -76,7 +74,7 @@ def constraint_jacobian(system: System, q: Array) -> scipy.sparse.csr_matrix:
 
 def dependence(
     system: System, q: Array, threshold: float = DEPENDENT, count: int | None = None,
-    acting: NDArray[np.int64] | None = None,
+    acting: Indices | None = None,
 ) -> Dependence:  # fmt: skip
     """Find the redundant constraint rows at q.
 
@@ -93,7 +91,7 @@ def dependence(
     acting : (c,) array, optional
         Constraint rows that are considered; all by default.
     """
-    rigid = np.nonzero(system.packed.rows["kind"] == CONSTRAINT)[0] if acting is None else acting
+    rigid = np.nonzero(system.constrained)[0] if acting is None else acting
     if rigid.size == 0:
         return Dependence(rigid, rigid, np.zeros((0, 0)))
     if rigid.size <= DENSE_ROWS or acting is not None:
@@ -101,7 +99,7 @@ def dependence(
     return _sparse(system, q, rigid, threshold, count)
 
 
-def _dense(system: System, q: Array, rigid: NDArray[np.int64], threshold: float, count: int | None) -> Dependence:
+def _dense(system: System, q: Array, rigid: Indices, threshold: float, count: int | None) -> Dependence:
     """Find the dependence by a pivoted QR factorisation of the dimensionless Phi_q^T."""
     units, columns = system.row_units[rigid], system.units.copy()
     for body in system.bodies:
@@ -117,7 +115,7 @@ def _dense(system: System, q: Array, rigid: NDArray[np.int64], threshold: float,
     return Dependence(rigid[kept], rigid[dropped], coefficients / units[kept][:, None] * units[dropped])
 
 
-def _sparse(system: System, q: Array, rigid: NDArray[np.int64], threshold: float, count: int | None) -> Dependence:
+def _sparse(system: System, q: Array, rigid: Indices, threshold: float, count: int | None) -> Dependence:
     """Find the dependence by the Cholesky factor of Phi_q M^-1 Phi_q^T as in runs, row by row within its envelope."""
     workspace = system.workspace()
     factor_system(system.packed, 0.0, q, workspace)

@@ -30,19 +30,18 @@ from paraflex.dynamics.contacts import Contacts, contacts_of
 from paraflex.dynamics.coordinates import BodyCoordinates, piece_rows
 from paraflex.dynamics.inertia_moments import inertia_moments
 from paraflex.dynamics.system import System
-from paraflex.fem.element import axial_shape, transverse_shape
-from paraflex.fem.integrals import GAUSS_POINTS
+from paraflex.fem.integrals import GAUSS_PLACES, GAUSS_WEIGHTS
 from paraflex.mechanism import AssumedModesBeam, FlexibleBeam, Material, Section
+from paraflex.mechanism.bodies import per_span
 
 # Fewest pieces between stations: per beam, and per element. Under a uniform load the largest moment between two
 # stations exceeds that at the stations by at most 1/256 of itself.
 _BEAM_PIECES, _ELEMENT_PIECES = 16, 4
 # Coordinates with less than this fraction of the stretch under uniform tension do not give the axial force.
 _STRETCHES = 0.95
-Shape = Callable[[Array, float, int], Array]
+Shape = Callable[[int, Array, int], Array]
 # An element and positions in it, as fractions of its length.
 _Places = tuple[int, Array]
-_POINTS, _WEIGHTS = np.polynomial.legendre.leggauss(GAUSS_POINTS)
 
 
 class SectionLoads(NamedTuple):
@@ -129,6 +128,10 @@ class _Beam(NamedTuple):
 
     Attributes
     ----------
+    x : (s,) array
+        Distance from the beam's first end [m].
+    bars : sequence of Section and Material
+        Section and material at each of these places.
     resisted : (s, nf) array, optional
         Moment per acceleration of each coordinate across the beam.
     change : _Change, optional
@@ -138,6 +141,8 @@ class _Beam(NamedTuple):
     """
 
     body: str
+    x: Array
+    bars: Sequence[tuple[Section, Material]]
     moment: Array
     force: Array | None
     resisted: Array | None = None
@@ -168,23 +173,21 @@ def sections_of(system: System) -> Sections | None:
 
 
 def _sections(system: System) -> Sections | None:
-    found = [
+    parts = tuple(
         _stations(described, system)
         for described in system.mechanism.bodies
         if isinstance(described, FlexibleBeam | AssumedModesBeam) and system.body(described.name).nf
-    ]
-    if not found:
+    )
+    if not parts:
         return None
-    parts, x, sections, materials = zip(*found, strict=True)
-    fibres = [(one, made) for each, made_of in zip(sections, materials, strict=True)
-              for one, made in zip(each, made_of, strict=True)]  # fmt: skip
+    bars = [bar for part in parts for bar in part.bars]
     return Sections(
-        bodies=tuple(part.body for part, places in zip(parts, x, strict=True) for _ in places),
-        x=np.concatenate(x),
-        area=np.array([one.area for one, _ in fibres]),
+        bodies=tuple(part.body for part in parts for _ in part.bars),
+        x=np.concatenate([part.x for part in parts]),
+        area=np.array([one.area for one, _ in bars]),
         modulus=np.array([np.nan if one.outer_fibre is None else one.second_moment / one.outer_fibre
-                          for one, _ in fibres]),
-        strength=np.array([np.nan if made.strength is None else made.strength for _, made in fibres]),
+                          for one, _ in bars]),
+        strength=np.array([np.nan if made.strength is None else made.strength for _, made in bars]),
         contacts={joint: part.body for part in parts if part.contacts is not None for joint in part.contacts.joints},
         parts=parts,
     )  # fmt: skip
@@ -193,8 +196,6 @@ def _sections(system: System) -> Sections | None:
 class SectionAt(NamedTuple):
     """A section of a flexible beam, at a position (1,) slightly inside its element."""
 
-    section: Section
-    material: Material
     part: _Beam
     place: Array
 
@@ -221,37 +222,33 @@ def section_at(system: System, name: str, x: float) -> SectionAt | None:
     if not body.nf:
         return None
     if isinstance(described, AssumedModesBeam):
-        return SectionAt(described.section, described.material, _assumed(described, body, place), place)
+        return SectionAt(_assumed(described, body, place), place)
     nodes = described.mesh.nodes
     # A position at a node up to rounding is at the node.
     e = int(np.clip(np.searchsorted(nodes, x + 1e-12 * nodes[-1], side="right") - 1, 0, nodes.size - 2))
     z = min(max((x - nodes[e]) / (nodes[e + 1] - nodes[e]), 0.0), 1.0)
-    part, _, (section,), (material,) = _meshed(described, body, [(e, np.array([z]))])
+    part = _meshed(described, body, [(e, np.array([z]))])
     contacts = contacts_of(system, described)
     if contacts is not None:
         place = contacts.inside(place, np.array([e]))
         part = part._replace(contacts=contacts._replace(rows=tuple(range(len(contacts.rows)))))
-    return SectionAt(section, material, part, place)
+    return SectionAt(part, place)
 
 
-def _stations(
-    described: FlexibleBeam | AssumedModesBeam, system: System
-) -> tuple[_Beam, Array, Sequence[Section], Sequence[Material]]:
-    """Return rows, positions, sections and materials of a beam's stations."""
+def _stations(described: FlexibleBeam | AssumedModesBeam, system: System) -> _Beam:
+    """Return the data of a beam at its stations."""
     body = system.body(described.name)
     if isinstance(described, FlexibleBeam):
         mesh = described.mesh
         pieces = max(_ELEMENT_PIECES, -(-_BEAM_PIECES // mesh.n_elements))
         at = [(e, np.linspace(0.0, 1.0, pieces + 1)) for e in range(mesh.n_elements)]
-        part, x, sections, materials = _meshed(described, body, at)
-        return part._replace(contacts=contacts_of(system, described)), x, sections, materials
+        return _meshed(described, body, at)._replace(contacts=contacts_of(system, described))
     pieces = max(_BEAM_PIECES, _ELEMENT_PIECES * described.shapes.count)
-    x = np.linspace(0.0, 1.0, pieces + 1) * described.length
-    return _assumed(described, body, x), x, [described.section] * x.size, [described.material] * x.size
+    return _assumed(described, body, np.linspace(0.0, 1.0, pieces + 1) * described.length)
 
 
 def _assumed(described: AssumedModesBeam, body: BodyCoordinates, x: Array) -> _Beam:
-    """Return the rows of the sections of a bar of assumed modes at positions x (s,)."""
+    """Return the data of a bar of assumed modes at positions x (s,)."""
     D, shapes, bent = body.integrals.D, described.shapes, len(described.transverse)
     E = described.material.youngs_modulus
     moment = E * described.section.second_moment * shapes.transverse_rows(x, derivative=2) @ D[:bent]
@@ -259,19 +256,16 @@ def _assumed(described: AssumedModesBeam, body: BodyCoordinates, x: Array) -> _B
     ends = shapes.axial_rows(np.array([0.0, 1.0]) * described.length) @ D[bent:]
     stiffness = E * described.section.area
     force = stiffness * strain if _stretches(body, ends[1] - ends[0], described.length / stiffness) else None
-    return _Beam(body.name, moment, force)
+    return _Beam(body.name, x, [(described.section, described.material)] * x.size, moment, force)
 
 
-def _meshed(
-    beam: FlexibleBeam, body: BodyCoordinates, at: Sequence[_Places]
-) -> tuple[_Beam, Array, Sequence[Section], Sequence[Material]]:
-    """Return rows, positions, sections and materials at positions in some elements: see `_stations`."""
-    mesh, D = beam.mesh, body.integrals.D
-    section, material, spans = beam.section, beam.material, beam.spans
-    sections = section if isinstance(section, tuple) else (section,) * mesh.n_spans
-    materials = material if isinstance(material, tuple) else (material,) * mesh.n_spans
-    owners = np.concatenate([np.full(z.size, mesh.spans[e]) for e, z in at])
-    own, made = [sections[span] for span in owners], [materials[span] for span in owners]
+def _meshed(beam: FlexibleBeam, body: BodyCoordinates, at: Sequence[_Places]) -> _Beam:
+    """Return the data of a beam at positions in some elements, without contacts."""
+    mesh, D, spans = beam.mesh, body.integrals.D, beam.spans
+    sections = per_span(beam.section, mesh.n_spans, "section")
+    materials = per_span(beam.material, mesh.n_spans, "material")
+    elements = np.concatenate([np.full(z.size, e) for e, z in at])
+    owners = mesh.spans[elements]
     lengths = np.diff(mesh.nodes)
     first, last = (mesh.shape_at_node(node)[0][0] @ D for node in (0, mesh.n_elements))
     bend, stretch = (np.array([getattr(spans[span], name) for span in mesh.spans])
@@ -279,18 +273,18 @@ def _meshed(
     x = np.concatenate([mesh.nodes[e] + z * lengths[e] for e, z in at])
 
     def rows(shape: Shape, derivative: int, stiffness: Array) -> Array:
-        each = [stiffness[e] * mesh.scatter(e, shape(z * lengths[e], lengths[e], derivative)) for e, z in at]
+        each = [stiffness[e] * shape(e, z * lengths[e], derivative) for e, z in at]
         return np.concatenate(each) @ D
 
-    elements = np.concatenate([np.full(z.size, e) for e, z in at])
     part = _Beam(
-        body.name, rows(transverse_shape, 2, bend), None,
+        body.name, x, [(sections[span], materials[span]) for span in owners],
+        rows(mesh.transverse_rows, 2, bend), None,
         resisted=piece_rows(inertia_moments(beam, body), elements, x - mesh.nodes[elements]),
     )  # fmt: skip
     if _stretches(body, last - first, np.sum(lengths / stretch)):
         mass = np.array([spans[span].mass_per_length for span in owners])
-        part = part._replace(force=rows(axial_shape, 1, stretch), change=_change(beam, D, at, mass))
-    return part, x, own, made
+        part = part._replace(force=rows(mesh.axial_rows, 1, stretch), change=_change(beam, D, at, mass))
+    return part
 
 
 def _stretches(body: BodyCoordinates, lengthened: Array, flexibility: float) -> bool:
@@ -306,16 +300,16 @@ def _change(beam: FlexibleBeam, D: Array, at: Sequence[_Places], mass: Array) ->
     for e, z in at:
         length = mesh.nodes[e + 1] - mesh.nodes[e]
         # First to the stations, then the mean over the element, 1/l int (l - x) dx.
-        x = np.outer(z, 0.5 * (_POINTS + 1.0)) * length
-        weights = np.outer(z, 0.5 * _WEIGHTS) * length
-        whole, share = 0.5 * (_POINTS + 1.0) * length, 0.25 * _WEIGHTS * (1.0 - _POINTS) * length
+        x = np.outer(z, 0.5 * (GAUSS_PLACES + 1.0)) * length
+        weights = np.outer(z, 0.5 * GAUSS_WEIGHTS) * length
+        whole, share = 0.5 * (GAUSS_PLACES + 1.0) * length, 0.25 * GAUSS_WEIGHTS * (1.0 - GAUSS_PLACES) * length
 
         def changed(values: Array, mean: Array, weights: Array = weights, share: Array = share) -> Array:
             values = values.reshape(weights.shape + values.shape[1:])
             return np.einsum("sg,sg...->s...", weights, values) - np.tensordot(share, mean, 1)
 
-        for rows, shape in ((along, axial_shape), (across, transverse_shape)):
-            there, mean = (mesh.scatter(e, shape(places, length)) @ D for places in (x.ravel(), whole))
+        for rows, shape in ((along, mesh.axial_rows), (across, mesh.transverse_rows)):
+            there, mean = (shape(e, places) @ D for places in (x.ravel(), whole))
             rows.append(changed(there, mean))
         place.append(changed(mesh.nodes[e] + x.ravel(), mesh.nodes[e] + whole))
         one.append(changed(np.ones(x.size), np.ones(whole.size)))

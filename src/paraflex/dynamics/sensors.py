@@ -16,13 +16,13 @@ import scipy
 
 from paraflex.arrays import Array, Numbers
 from paraflex.dynamics.contacts import sliding_joints
-from paraflex.dynamics.joint_coordinates import axis_angle, joint_coordinate, line_direction
+from paraflex.dynamics.joint_coordinates import axis_angle, joint_coordinate, line_direction, unit_vectors
 from paraflex.dynamics.joint_loads import JointParts, joint_parts, load_in
 from paraflex.dynamics.points import marker_position, point_motion
 from paraflex.dynamics.sections import section_at
 from paraflex.dynamics.system import System
 from paraflex.errors import InputError
-from paraflex.mechanism import GROUND, AssumedModesBeam, FlexibleBeam, Joint, Mechanism, PointRef, Sensor
+from paraflex.mechanism import GROUND, AssumedModesBeam, FlexibleBeam, Mechanism, PointRef, Sensor
 from paraflex.mechanism.checks import check_sensor
 
 _STEP = 1e-30
@@ -61,44 +61,35 @@ class _Needed:
         self.beams: dict[str, None] = {}
         self._random = np.random.default_rng(0)
 
-    def _some(self, *columns: int) -> Array:
+    def _of(self, *bodies: str, columns: tuple[int, ...] = ()) -> Array:
+        self.bodies |= {name: None for name in bodies if name != GROUND}
         return 1.0 + self._random.random((1, *columns))
 
-    def _of_joints(self, *joints: Joint) -> None:
-        self._of_bodies(*(point.body for joint in joints for point in (joint.a, joint.b)))
-
-    def _of_bodies(self, *names: str) -> None:
-        self.bodies |= {name: None for name in names if name != GROUND}
-
     def coordinate(self, joint: str) -> Array:
-        self._of_joints(self._mechanism.joint(joint))
-        return self._some()
+        named = self._mechanism.joint(joint)
+        return self._of(named.a.body, named.b.body)
 
     rate = coordinate
 
     def position(self, point: PointRef) -> Array:
-        self._of_bodies(point.body)
-        return self._some(2)
+        return self._of(point.body, columns=(2,))
 
     velocity = acceleration = position
 
     def displacement(self, point: PointRef) -> Array:
-        self._of_bodies(point.body)
-        return self._some(3)
+        return self._of(point.body, columns=(3,))
 
     def origin(self, body: str) -> Array:
-        self._of_bodies(body)
-        return self._some(2)
+        return self._of(body, columns=(2,))
 
     def angle(self, body: str) -> Array:
-        self._of_bodies(body)
-        return self._some()
+        return self._of(body)
 
     def strain(self, beam: str, at: float | str, distance: float | None) -> Array:
-        self._of_joints(*sliding_joints(self._mechanism, beam))
-        self._of_bodies(beam)
+        for joint in sliding_joints(self._mechanism, beam):
+            self.coordinate(joint.name)
         self.beams[beam] = None
-        return self._some()
+        return self._of(beam)
 
     def moment(self, joint: str) -> Array:
         self.loads[joint] = None
@@ -106,7 +97,7 @@ class _Needed:
 
     def axis(self, joint: str) -> Array:
         self.coordinate(joint)
-        return self._some(2)
+        return self._of(columns=(2,))
 
     def force(self, joint: str) -> Array:
         self.loads[joint] = None
@@ -214,7 +205,8 @@ class _LocalInputs:
         at_place = self._local.section_at(beam, described.points[at] if isinstance(at, str) else at)
         if at_place is None:
             return np.zeros(len(self._at.q), self._at.q.dtype)
-        section, stiffness = at_place.section, at_place.material.youngs_modulus
+        ((section, material),) = at_place.part.bars
+        stiffness = material.youngs_modulus
         distance = section.outer_fibre if distance is None else distance
         assert distance is not None
         multipliers = self._at.multipliers[:, self._local.contacts[beam]]
@@ -237,8 +229,7 @@ class _LocalInputs:
         named = self._system.mechanism.joint(joint)
         if "distance" in named.holds:
             return -line_direction(self._system, named, self._at.q)
-        angle = axis_angle(self._system, named, self._at.q)
-        return np.column_stack([np.cos(angle), np.sin(angle)])
+        return unit_vectors(axis_angle(self._system, named, self._at.q))
 
 
 class SensorReader:
@@ -339,9 +330,8 @@ def sensor_rows(
         own = each.taken(state)
         sizes = [values.shape[1] for values in own]
         steps = np.split(1j * _STEP * np.eye(sum(sizes)), np.cumsum(sizes)[:-1], axis=1)
-        slopes = (
-            np.imag(each.read(MotionSamples(*(values + step for values, step in zip(own, steps, strict=True))))) / _STEP
-        )
+        moved = MotionSamples(*(values + step for values, step in zip(own, steps, strict=True)))
+        slopes = np.imag(each.read(moved)) / _STEP
         for kind, columns, values in zip(entries, each.columns, np.split(slopes, np.cumsum(sizes)[:-1]), strict=True):
             kind.append((columns, values))
     return SensorRows(*(_sparse(kind, values.shape[1]) for kind, values in zip(entries, state, strict=True)))

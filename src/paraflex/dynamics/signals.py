@@ -60,12 +60,8 @@ def piecewise_quintic(t: Array, value: Array, rate: Array, acceleration: Array, 
 
 def constant_signals(values: Sequence[float], end: float) -> list[InputSignals]:
     """Return constant signals on [0, end]."""
-    signals = []
-    for value in values:
-        coefficients = np.zeros((1, _DEGREE + 1))
-        coefficients[0, 0] = value
-        signals.append(InputSignals(np.array([0.0, end]), coefficients))
-    return signals
+    breaks = np.array([0.0, end])
+    return [InputSignals(breaks, np.array([[value, 0.0, 0.0, 0.0, 0.0, 0.0]])) for value in values]
 
 
 def no_signals(packed: PackedSystem) -> Signals:
@@ -132,9 +128,8 @@ def profile_signal(place: str, profile: TimeProfile, end: float, left: float = 0
     if getattr(profile, "breaks", None) is not None:
         left = 0.0  # quintic already
     # The profile or a derivative may jump at a knot: the pieces on either side take its one-sided limits.
-    parts = []
-    for a, b in pairwise([0.0, *inner, end]):
-        parts.append(_refined(place, profile, _grid(profile, a, b, end), left))
+    intervals = pairwise([0.0, *inner, end])
+    parts = [_refined(place, profile, _grid(profile, a, b, end), left) for a, b in intervals]
     breaks = np.concatenate([part.breaks[:-1] for part in parts] + [parts[-1].breaks[-1:]])
     return InputSignals(breaks, np.vstack([part.coefficients for part in parts])), inner
 

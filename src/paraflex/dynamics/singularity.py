@@ -6,12 +6,10 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
-from paraflex.arrays import Array
-from paraflex.dynamics.joint_coordinates import joint_coordinate
+from paraflex.arrays import Array, Indices, Numbers
+from paraflex.dynamics.joint_coordinates import joint_rows
 from paraflex.dynamics.system import System
-from paraflex.kernel.packed import CONSTRAINT
 
 # Rows with a smaller singular value than this are redundant at all poses; closure errors are far smaller.
 _DEPENDENT = 1e-6
@@ -59,37 +57,26 @@ class SingularityMeasure:
             return columns if values.size == columns else 0
         return int(np.sum(values > _DEPENDENT))
 
-    def _values(self, q: Array) -> NDArray[np.floating]:
-        rows = self._scaled(q)
-        return np.linalg.svd(rows, compute_uv=False) if rows.size else np.zeros(0)
-
-    def _scaled(self, q: Array) -> Array:
-        """Return the matrix (rows, 3 bodies) by displacements and rotations of centres of mass, scaled by inertia."""
-        rows, parts = self._rows(q), self._bodies
-        at = parts.offsets
+    def _values(self, q: Array) -> Numbers:
+        """Return the singular values of the matrix by motions of the bodies' centres of mass, scaled by inertia."""
+        rows, (at, root_m, root_J, cx, cy) = self._rows(q), self._bodies
         x, y, turn = rows[:, at], rows[:, at + 1], rows[:, at + 2]
         c, s = np.cos(q[at + 2]), np.sin(q[at + 2])
-        arm_x, arm_y = c * parts.cx - s * parts.cy, s * parts.cx + c * parts.cy
+        arm_x, arm_y = c * cx - s * cy, s * cx + c * cy
         about = turn + x * arm_y - y * arm_x
-        scaled = np.hstack([x / parts.root_m, y / parts.root_m, about / parts.root_J])
-        return scaled / np.linalg.norm(scaled, axis=1, keepdims=True)
+        scaled = np.hstack([x / root_m, y / root_m, about / root_J])
+        return np.linalg.svd(scaled / np.linalg.norm(scaled, axis=1, keepdims=True), compute_uv=False)
 
     def _rows(self, q: Array) -> Array:
-        jacobian = self.system.jacobian(q)[self._constraints]
+        jacobian = self.system.jacobian(q)[self.system.constrained]
         if not self.motors:
             return jacobian
-        axes = [joint_coordinate(self.system, joint, q[None]).rows for joint in self._joints(slides=True)]
-        return np.vstack([jacobian, self._turning, *axes])
-
-    @cached_property
-    def _constraints(self) -> NDArray[np.bool_]:
-        return self.system.packed.rows["kind"] == CONSTRAINT
+        return np.vstack([jacobian, self._turning, joint_rows(self.system, self._joints(slides=True), q)])
 
     @cached_property
     def _turning(self) -> Array:
         """Rows of revolute joints, which do not depend on the pose."""
-        rows = [joint_coordinate(self.system, joint, self.start[None]).rows for joint in self._joints(slides=False)]
-        return np.vstack(rows) if rows else np.zeros((0, self.system.n))
+        return joint_rows(self.system, self._joints(slides=False), self.start)
 
     def _joints(self, *, slides: bool) -> list[str]:
         mechanism = self.system.mechanism
@@ -97,20 +84,10 @@ class SingularityMeasure:
         return [joint for joint in joints if mechanism.slides(joint) is slides]
 
     @cached_property
-    def _bodies(self) -> _Bodies:
+    def _bodies(self) -> tuple[Indices, Array, Array, Array, Array]:
+        """Start of each body's coordinates, roots of its mass and inertia, centre of mass of the undeformed body."""
         bodies = self.system.bodies
         m = np.array([body.integrals.m for body in bodies])
         cx, cy = (np.array([body.integrals.S1[k] for body in bodies]) / m for k in range(2))
         J = np.array([body.integrals.I0 + body.integrals.J for body in bodies]) - m * (cx**2 + cy**2)
-        return _Bodies(np.array([body.offset for body in bodies]), np.sqrt(m), np.sqrt(J), cx, cy)
-
-
-@dataclass(frozen=True)
-class _Bodies:
-    """Properties of every undeformed body: start of its coordinates, roots of mass and inertia, its centre of mass."""
-
-    offsets: NDArray[np.int64]
-    root_m: Array
-    root_J: Array
-    cx: Array
-    cy: Array
+        return np.array([body.offset for body in bodies]), np.sqrt(m), np.sqrt(J), cx, cy

@@ -10,9 +10,8 @@ from collections.abc import Iterable, Sequence
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
-from paraflex.arrays import Array, Numbers
+from paraflex.arrays import Array, Indices, Numbers
 from paraflex.dynamics.joint_coordinates import joint_coordinate
 from paraflex.dynamics.signals import no_signals
 from paraflex.dynamics.system import System
@@ -64,10 +63,7 @@ def sparse_mass(system: System, q: Array) -> scipy.sparse.csr_matrix:
 
 def stiffness_diagonal(system: System) -> Array:
     """Return the elastic stiffness (n,) of each coordinate: omega^2 for modal ones, zero for rigid ones."""
-    diagonal = np.zeros(system.n)
-    for body in system.bodies:
-        diagonal[body.flexible] = body.modes.omega**2
-    return diagonal
+    return np.concatenate([body.stiffness for body in system.bodies])
 
 
 def elastic_stiffness(system: System, q: Array, *, every_spring: bool = False) -> scipy.sparse.csr_matrix:
@@ -78,10 +74,15 @@ def elastic_stiffness(system: System, q: Array, *, every_spring: bool = False) -
     mechanism, stiffness = system.mechanism, scipy.sparse.diags(stiffness_diagonal(system))
     springs = [one for one in mechanism.springs if every_spring or is_hinge(mechanism.joint(one.joint))]
     if springs:
-        rows = [scipy.sparse.csr_matrix(joint_coordinate(system, spring.joint, q[None]).rows) for spring in springs]
-        J = scipy.sparse.vstack(rows)
+        J = sparse_joint_rows(system, [spring.joint for spring in springs], q)
         stiffness = stiffness + J.T @ scipy.sparse.diags([spring.stiffness for spring in springs]) @ J
     return scipy.sparse.csr_matrix(stiffness)
+
+
+def sparse_joint_rows(system: System, joints: Iterable[str], q: Array) -> scipy.sparse.csr_matrix:
+    """Return the derivatives (joints, n) of the coordinates of joints."""
+    rows = [scipy.sparse.csr_matrix(joint_coordinate(system, joint, q[None]).rows) for joint in joints]
+    return scipy.sparse.csr_matrix(scipy.sparse.vstack([scipy.sparse.csr_matrix((0, system.n)), *rows]))
 
 
 def sparse_jacobian(system: System, q: Array) -> scipy.sparse.csr_matrix:
@@ -115,14 +116,12 @@ def sparse_jacobian(system: System, q: Array) -> scipy.sparse.csr_matrix:
     return jacobian
 
 
-def tied_bodies(system: System) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def tied_bodies(system: System) -> tuple[Indices, Indices]:
     """Return the pairs of a constraint row and a body that it involves, as two arrays."""
     ports = system.packed.ports
-    owner = system.packed.markers["body"][ports["marker"]]
-    pairs = np.column_stack([np.repeat(ports["row"], ports["rows"]), np.repeat(owner, ports["rows"])])
-    first = np.concatenate([[0], np.cumsum(ports["rows"])])[:-1]
-    pairs[:, 0] += np.arange(len(pairs)) - np.repeat(first, ports["rows"])
-    pairs = np.unique(pairs, axis=0)
+    pairs: Indices = np.column_stack([ports["row"], system.packed.markers["body"][ports["marker"]]])
+    second: Indices = pairs[ports["rows"] == 2] + np.array([1, 0])
+    pairs = np.unique(np.concatenate([pairs, second]), axis=0)
     return pairs[:, 0], pairs[:, 1]
 
 
@@ -145,12 +144,12 @@ def bodies_acted_on(system: System) -> list[set[int]]:
     return neighbours(system, [[index[ref.body] for ref in pair if not ref.on_ground] for pair in ends])
 
 
-def apart_colours(tied: list[set[int]]) -> NDArray[np.int64]:
+def apart_colours(tied: list[set[int]]) -> Indices:
     """Return a colour for every body, such that two bodies of one colour act on no common body."""
     return greedy_colours([set().union(*(tied[other] for other in others)) for others in tied])
 
 
-def greedy_colours(neighbours: list[set[int]]) -> NDArray[np.int64]:
+def greedy_colours(neighbours: list[set[int]]) -> Indices:
     """Return a colour for every body, different from those of its neighbours."""
     colours = np.full(len(neighbours), -1)
     for body, others in enumerate(neighbours):
@@ -274,7 +273,7 @@ def solved(matrix: scipy.sparse.csr_matrix, units: Array, right: Array) -> Array
     return units * np.linalg.solve(rows[:, None] * scaled, rows * right)
 
 
-def _is_odd(order: NDArray[np.int64]) -> bool:
+def _is_odd(order: Indices) -> bool:
     """Return whether a permutation consists of an odd number of transpositions."""
     cycles = scipy.sparse.csgraph.connected_components(
         scipy.sparse.csr_matrix((np.ones(order.size), (np.arange(order.size), order)), shape=(order.size,) * 2)

@@ -8,14 +8,13 @@ from typing import NamedTuple
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
 from paraflex.arguments import checked_arguments
-from paraflex.arrays import Array
+from paraflex.arrays import Array, Mask
 from paraflex.dynamics.change_points import change_point_at
 from paraflex.dynamics.coordinates import BodyCoordinates, end_markers
 from paraflex.dynamics.following import POSITION_STIFFNESS, follow_drives
-from paraflex.dynamics.joint_coordinates import joint_coordinate
+from paraflex.dynamics.joint_coordinates import joint_value
 from paraflex.dynamics.points import marker_place
 from paraflex.dynamics.projection import assemble, constraint_change, least_change, link_metric, project
 from paraflex.dynamics.rank import constraint_jacobian
@@ -108,8 +107,8 @@ def standing_system(mechanism: Mechanism, start: Start | State | str | None, ass
         start, assembly = None, start
     if not isinstance(start, State):
         return build_system(standing(mechanism, assembly, start))
-    system, q = build_system(mechanism), start.q[None]
-    begun = begun_at(mechanism, lambda joint: float(joint_coordinate(system, joint, q).value[0]), start.time)
+    system, q = build_system(mechanism), start.q
+    begun = begun_at(mechanism, lambda joint: joint_value(system, joint, q), start.time)
     return system if begun is mechanism else build_system(begun)
 
 
@@ -219,7 +218,7 @@ def _coordinates(system: System, signals: Signals, start: Start, assembly: Assem
     return _closed(system, signals, time, q, held)
 
 
-def _closed(system: System, signals: Signals, time: float, q: Array, held: NDArray[np.bool_]) -> Array:
+def _closed(system: System, signals: Signals, time: float, q: Array, held: Mask) -> Array:
     """Close the joints by the least change of the coordinates that are not held."""
     q = q if np.any(held) else follow_drives(system, signals, time, q)
     change = partial(constraint_change, system, stiffness=POSITION_STIFFNESS, free=~held)
@@ -310,7 +309,7 @@ def _velocity_entries(system: System, start: Start, q: Array) -> list[_VelocityE
     return given
 
 
-def _refuse_velocities(system: System, entries: list[_VelocityEntry], slip: Array, bad: NDArray[np.bool_]) -> None:
+def _refuse_velocities(system: System, entries: list[_VelocityEntry], slip: Array, bad: Mask) -> None:
     worst = int(np.argmax(np.where(bad, slip, 0.0)))
     where = system.rows[worst] if worst < system.m else "what is given"
     of_given = slip[system.m :]

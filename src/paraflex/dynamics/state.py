@@ -16,12 +16,10 @@ from paraflex.dynamics.change_points import branches_from_rest, change_point_at
 from paraflex.dynamics.following import POSITION_STIFFNESS, follow_drives
 from paraflex.dynamics.points import marker_position
 from paraflex.dynamics.projection import (
-    NAMED,
     assemble,
     closed,
     constraint_change,
-    gap_unit,
-    joint_gaps,
+    gap_texts,
     project,
     refuse_conflict,
     second_rates,
@@ -79,19 +77,19 @@ def undeformed(system: System, rigid: System, state: State) -> State:
 
 
 def undeformed_motion(system: System, rigid: System, q: Array, v: Array, a: Array) -> tuple[Array, Array, Array]:
-    """Return coordinates (n,) and their derivatives of undeformed bodies that move as the rigid ones.
+    """Return coordinates (..., n) and their derivatives of undeformed bodies that move as the rigid ones.
 
     Parts of a divided beam are at their positions along it.
     """
-    there = np.zeros((3, system.n))
+    there = np.zeros((3, *q.shape[:-1], system.n))
     for body in system.bodies:
         name, along = system.carrier(body.name)
-        (x, y, phi), (vx, vy, w), (ax, ay, dw) = (part[rigid.body(name).all] for part in (q, v, a))
+        (x, y, phi), (vx, vy, w), (ax, ay, dw) = (part.T[rigid.body(name).all] for part in (q, v, a))
         c, s = along * np.cos(phi), along * np.sin(phi)
         own = slice(body.offset, body.offset + 3)
-        there[0, own] = x + c, y + s, phi
-        there[1, own] = vx - w * s, vy + w * c, w
-        there[2, own] = ax - dw * s - w * w * c, ay + dw * c - w * w * s, dw
+        there[0].T[own] = x + c, y + s, phi
+        there[1].T[own] = vx - w * s, vy + w * c, w
+        there[2].T[own] = ax - dw * s - w * w * c, ay + dw * c - w * w * s, dw
     return there[0], there[1], there[2]
 
 
@@ -191,8 +189,7 @@ def project_position(system: System, signals: Signals, t: float, q: Array) -> Ar
         return closest
     closest = _closest(system, signals, t, q)
     phi, _ = system.constraints(signals, t, closest)
-    gaps = joint_gaps(system, phi)
-    gap, where = f"{max(gaps.values()):.3g} {gap_unit(system, phi)}", " and ".join(list(gaps)[:NAMED])
+    gap, where = gap_texts(system, phi)
     cause = f"the loops do not close: a gap of {gap} remains in {where}"
     raise AssemblyError(cause, Moment(t, 0), closest, "correct angles of the assembly, lengths or places of points")
 
@@ -311,10 +308,8 @@ def consistent_state(
     signals = moment_signals(system.mechanism, time)
     q = assembled_position(system, signals, time, q)
     try:
-        if velocity is None:
-            v = project_velocity(system, signals, time, q, np.zeros(system.n), VELOCITY_STIFFNESS)
-        else:
-            v = project_velocity(system, signals, time, q, velocity)
+        wanted, stiffness = (np.zeros(system.n), VELOCITY_STIFFNESS) if velocity is None else (velocity, 0.0)
+        v = project_velocity(system, signals, time, q, wanted, stiffness)
         check_accelerations(system, signals, time, q, v)
     except InconsistentConstraintsError as error:
         target = -system.constraints(signals, time, q)[1]

@@ -6,9 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
-from paraflex.arrays import Array
+from paraflex.arrays import Array, Indices
 from paraflex.dynamics.inputs import inputs_of
 from paraflex.dynamics.signals import moment_signals
 from paraflex.dynamics.sparse import without_stiffness
@@ -21,23 +20,25 @@ from paraflex.kernel.stage import equations
 class RestingForces:
     """Forces at rest (n,), signed as on the left-hand side of the equations, and rows of springs (m,).
 
-    The stiffness of beams is not included: it is a diagonal matrix and would dominate all other forces. With velocities
-    `v` and accelerations `a` (n,) other than zero the forces are those of a motion.
+    The stiffness of beams is not included by default: it is a diagonal matrix and would dominate all other forces. With
+    velocities `v` and accelerations `a` (n,) other than zero the forces are those of a motion.
     """
 
-    def __init__(self, system: System, time: float) -> None:
-        self.packed: PackedSystem = without_stiffness(system.packed)
+    def __init__(self, system: System, time: float, *, beams: bool = False) -> None:
+        self.packed: PackedSystem = system.packed if beams else without_stiffness(system.packed)
         self.time = time
         self.signals: Signals = moment_signals(system.mechanism, time)
         self.workspace: Workspace = system.workspace()
         self.v: Array = np.zeros(system.n)
         self.a: Array = np.zeros(system.n)
         self.torques: Array = np.zeros(inputs_of(system.mechanism).acting)
-        self.springs: NDArray[np.intp] = np.nonzero(system.packed.rows["kind"] == SPRING)[0]
+        self.springs: Indices = np.nonzero(system.packed.rows["kind"] == SPRING)[0]
 
     def __call__(self, q: Array, lam: Array) -> tuple[Array, Array]:
         """Return forces and rows at coordinates (n,) with multipliers (m,)."""
-        self._evaluate(q, lam)
+        equations(
+            self.packed, self.signals, self.time, INDEX_1, q, self.v, self.a, lam, self.torques, self.workspace
+        )  # fmt: skip
         return self.workspace.f.copy(), self.workspace.rows[self.springs]
 
     def compliant(self, q: Array) -> Array:
@@ -47,14 +48,8 @@ class RestingForces:
         # here.
         scale = np.where(rows["kind"] == FRICTION, 1.0, rows["compliance"])
         self.workspace.compliance[:] = scale
-        self._evaluate(q, np.zeros(rows.size))
-        compliant = rows["kind"] != CONSTRAINT
-        return np.divide(self.workspace.rows, scale, out=np.zeros(rows.size), where=compliant)
-
-    def _evaluate(self, q: Array, lam: Array) -> None:
-        equations(
-            self.packed, self.signals, self.time, INDEX_1, q, self.v, self.a, lam, self.torques, self.workspace
-        )  # fmt: skip
+        self(q, np.zeros(rows.size))
+        return np.divide(self.workspace.rows, scale, out=np.zeros(rows.size), where=rows["kind"] != CONSTRAINT)
 
 
 def pose_stiffness(system: System, time: float, q: Array, lam: Array) -> scipy.sparse.csr_matrix:

@@ -11,10 +11,10 @@ import numpy as np
 import scipy
 
 from paraflex.arguments import checked_arguments, named_in_errors
-from paraflex.arrays import Array
+from paraflex.arrays import Array, Mask
 from paraflex.dynamics.body_bases import is_reduced, reduced_body
 from paraflex.dynamics.constraints import RowTerm, row_order, terms_by_joint
-from paraflex.dynamics.coordinates import BodyCoordinates, Marker, body_coordinates, make_marker
+from paraflex.dynamics.coordinates import BodyCoordinates, Marker, PlacedBodies, body_coordinates
 from paraflex.dynamics.damping import damping_matrix
 from paraflex.dynamics.packing import pack_system
 from paraflex.kernel.constraints import constraint_values, fill_jacobian
@@ -32,23 +32,19 @@ T = TypeVar("T")
 
 @named_in_errors("a system", "the system that dynamics.build_system makes")
 @dataclass(frozen=True)
-class System:
+class System(PlacedBodies):
     """A mechanism as constant arrays, made by `build_system`.
 
     Attributes
     ----------
-    mechanism : Mechanism
-        Mechanism in the frames of its parts, with actuators included.
-    bodies : tuple of BodyCoordinates
-        Coordinates of each body.
+    mechanism, bodies
+        Mechanism, and the coordinates of each body: see `PlacedBodies`.
     packed : PackedSystem
         Arrays and records read by the kernels.
     rows : tuple of str
         Name of each constraint row ("B1 x", "crank angle"), in the order of the multipliers.
     """
 
-    mechanism: Mechanism
-    bodies: tuple[BodyCoordinates, ...]
     packed: PackedSystem
     rows: tuple[str, ...]
 
@@ -65,7 +61,12 @@ class System:
     @property
     def n_constraints(self) -> int:
         """Number of constraint rows, without those of springs, dampers and friction."""
-        return int(np.sum(self.packed.rows["kind"] == CONSTRAINT))
+        return int(np.sum(self.constrained))
+
+    @cached_property
+    def constrained(self) -> Mask:
+        """Mask (m,) of the constraint rows among all rows."""
+        return self.packed.rows["kind"] == CONSTRAINT
 
     @property
     def n_flexible(self) -> int:
@@ -101,9 +102,8 @@ class System:
         rows = scipy.sparse.lil_matrix((sum(len(body.shape.slopes) for body in self.bodies), self.n))
         first = 0
         for body in self.bodies:
-            last = first + len(body.shape.slopes)
-            rows[first:last, body.flexible] = body.shape.slopes @ body.integrals.D
-            first = last
+            own = slice(first, first := first + len(body.shape.slopes))
+            rows[own, body.flexible] = body.shape.slopes @ body.integrals.D
         return rows.tocsr()
 
     @cached_property
@@ -112,14 +112,9 @@ class System:
         return float(np.min(self.row_units, initial=1.0))
 
     @cached_property
-    def lowest(self) -> tuple[float, ...]:
-        """Lowest angular frequency of each flexible body [rad/s]."""
-        return tuple(float(np.min(body.modes.omega)) for body in self.bodies if body.nf)
-
-    @property
     def slowest(self) -> float:
         """Angular frequency of the slowest vibration of a flexible body [rad/s]; 1000 if there is none."""
-        return min(self.lowest, default=_USUAL)
+        return min((float(np.min(body.modes.omega)) for body in self.bodies if body.nf), default=_USUAL)
 
     @cached_property
     def vibrations_die_out(self) -> bool:
@@ -132,11 +127,6 @@ class System:
         """Return the largest violation among constraint rows (m,), lengths in sizes of the mechanism, angles in rad."""
         return float(np.max(np.abs(phi) / self.row_units, initial=0.0))
 
-    @cached_property
-    def index(self) -> dict[str, int]:
-        """Index of each body by name."""
-        return {body.name: i for i, body in enumerate(self.bodies)}
-
     def once(self, name: Hashable, make: Callable[[], T]) -> T:
         """Return a quantity that depends on the system alone, computed by `make` once and cached by name."""
         kept: dict[Hashable, Any] = vars(self).setdefault("_kept", {})
@@ -147,7 +137,7 @@ class System:
     @cached_property
     def row_terms(self) -> dict[str, list[RowTerm]]:
         """Terms of constraint rows, by joint."""
-        return terms_by_joint(row_order(self.mechanism, self.index))
+        return terms_by_joint(row_order(self.mechanism))
 
     def body(self, name: str) -> BodyCoordinates:
         """Return the coordinates of a body by name; of a divided body those of its first part."""
@@ -155,11 +145,9 @@ class System:
 
     def marker(self, ref: PointRef) -> Marker:
         """Return the material point of a name, on a body as described or on a part of it."""
-        return self.once(ref, lambda: self._marker(ref))
-
-    def _marker(self, ref: PointRef) -> Marker:
         cut = self.mechanism.cut
-        return make_marker(self.mechanism, self.bodies, self.index, ref if cut is None else cut.points.get(ref, ref))
+        own = ref if cut is None else cut.points.get(ref, ref)
+        return self.once(own, lambda: PlacedBodies.marker(self, own))
 
     @property
     def described(self) -> Mechanism:
@@ -179,10 +167,7 @@ class System:
     @cached_property
     def described_rows(self) -> tuple[str, ...]:
         """Names of the rows of the mechanism as described."""
-        if self.mechanism.cut is None:
-            return self.rows
-        index = {body.name: i for i, body in enumerate(self.described.bodies)}
-        return tuple(label for one in row_order(self.described, index) for label in one.labels)
+        return tuple(label for one in row_order(self.described) for label in one.labels)
 
     def workspace(self) -> Workspace:
         """Return a new workspace for the kernels."""
@@ -200,6 +185,10 @@ class System:
         jacobian = np.zeros((self.m, self.n))
         fill_jacobian(self.packed, q, jacobian)
         return jacobian
+
+    def dimensionless_jacobian(self, q: Array) -> Array:
+        """Return Phi_q at q in units of the coordinates and of the rows."""
+        return self.jacobian(q) * self.units / self.row_units[:, None]
 
 
 @checked_arguments()
@@ -227,29 +216,27 @@ def build_system(mechanism: Mechanism, like: System | None = None) -> System:
         The damping of a body cannot be computed, for numbers too far apart.
     """
     mechanism = with_actuators(in_frames(mechanism))
-    index = {body.name: i for i, body in enumerate(mechanism.bodies)}
-    constraints = row_order(mechanism, index)
+    constraints = row_order(mechanism)
     modes = {} if like is None else {body.name: body.modes for body in like.bodies}
     reduced = [body.name for body in mechanism.bodies if is_reduced(mechanism, body)]
-    whole = [
+    whole = tuple(
         body_coordinates(body, mechanism.geometry, None if body.name in reduced else modes.get(body.name))
         for body in mechanism.bodies
-    ]
+    )
     undamped, offset = [], 0
     for body in whole:
         if body.name in reduced:
-            body = reduced_body(mechanism, whole, constraints, body.name, modes.get(body.name))
+            body = reduced_body(PlacedBodies(mechanism, whole), constraints, body.name, modes.get(body.name))
         undamped.append(replace(body, offset=offset))
         offset += 3 + body.nf
-    bodies = []
+    bodies, placed = [], PlacedBodies(mechanism, tuple(undamped))
     for body in undamped:
         with solvable(f"the damping of {body.name}"):
-            bodies.append(replace(body, damping=damping_matrix(mechanism, tuple(undamped), index, body.name)))
-    packed, rows = pack_system(mechanism, tuple(bodies), index, constraints)
-    return System(mechanism=mechanism, bodies=tuple(bodies), packed=packed, rows=rows)
+            bodies.append(replace(body, damping=damping_matrix(placed, body.name)))
+    return System(mechanism, tuple(bodies), *pack_system(PlacedBodies(mechanism, tuple(bodies)), constraints))
 
 
 def with_constraints_of(system: System, mechanism: Mechanism) -> System:
     """Return the bodies of a system, with their damping, under the constraints of another mechanism of these bodies."""
-    packed, rows = pack_system(mechanism, system.bodies, system.index, row_order(mechanism, system.index))
-    return System(mechanism=mechanism, bodies=system.bodies, packed=packed, rows=rows)
+    packed, rows = pack_system(PlacedBodies(mechanism, system.bodies), row_order(mechanism))
+    return System(mechanism, system.bodies, packed, rows)

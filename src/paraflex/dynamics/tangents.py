@@ -17,18 +17,16 @@ from typing import NamedTuple
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 from scipy.sparse import csr_matrix
 
-from paraflex.arrays import Array
+from paraflex.arrays import Array, Indices
 from paraflex.dynamics.inputs import inputs_of
 from paraflex.dynamics.sparse import apart_colours, bodies_acted_on, tied_bodies
 from paraflex.dynamics.system import System
-from paraflex.kernel.packed import CONSTRAINT, FRICTION, INDEX_1, SPRING
+from paraflex.kernel.packed import FRICTION, INDEX_1, SPRING
 from paraflex.kernel.tangent import make_tangent, note_slopes
 from paraflex.kernel.tangent_columns import ACCELERATION, COORDINATE, VELOCITY, tangent_columns
 
-Numbers = NDArray[np.int64]
 # Weights of Phi'', Phi' and Phi for rows equal to Phi'.
 _RATES = (0.0, 1.0, 0.0)
 
@@ -69,7 +67,7 @@ class Tangents(NamedTuple):
     mass, damping, stiffness : (n, n) sparse arrays
         M, D and K, springs, dampers and friction at joints included.
     rows : (c,) array of int
-        Numbers of the system's rows that are constraints.
+        Indices of the system's rows that are constraints.
     jacobian : (c, n) sparse array
         Phi_q of these rows.
     rate : (c, n) sparse array
@@ -77,7 +75,7 @@ class Tangents(NamedTuple):
     second_place, second_rate : (c, n) sparse arrays
         Derivatives of Phi'' by the coordinates and by the velocities.
     compliant : (m - c,) array of int
-        Numbers of the rows of springs, dampers and friction at joints.
+        Indices of the rows of springs, dampers and friction at joints.
     compliant_place, compliant_rate : (m - c, n) sparse arrays
         Derivatives of their multipliers by the coordinates and the velocities.
     """
@@ -85,12 +83,12 @@ class Tangents(NamedTuple):
     mass: csr_matrix
     damping: csr_matrix
     stiffness: csr_matrix
-    rows: Numbers
+    rows: Indices
     jacobian: csr_matrix
     rate: csr_matrix
     second_place: csr_matrix
     second_rate: csr_matrix
-    compliant: Numbers
+    compliant: Indices
     compliant_place: csr_matrix
     compliant_rate: csr_matrix
 
@@ -99,26 +97,13 @@ class _Pattern(NamedTuple):
     """Sparsity pattern of a matrix (rows, columns), and the index of the computed value of each entry."""
 
     shape: tuple[int, int]
-    pointers: Numbers
-    columns: Numbers
-    sources: Numbers
+    pointers: Indices
+    columns: Indices
+    sources: Indices
 
     def matrix(self, values: Array) -> csr_matrix:
         """Return the matrix of computed columns (sources, rows)."""
         return csr_matrix((values.ravel()[self.sources], self.columns, self.pointers), shape=self.shape)
-
-
-def rows_of(rows: Numbers, *matrices: csr_matrix) -> tuple[csr_matrix, ...]:
-    """Return selected rows of matrices with the same sparsity pattern."""
-    pointers, columns, shape = matrices[0].indptr, matrices[0].indices, matrices[0].shape
-    assert shape is not None
-    counts = np.diff(pointers)[rows]
-    ends = np.cumsum(counts)
-    taken = np.arange(counts.sum()) + np.repeat(pointers[rows] - ends + counts, counts)
-    at = np.concatenate([[0], ends])
-    return tuple(
-        csr_matrix((matrix.data[taken], columns[taken], at), shape=(rows.size, shape[1])) for matrix in matrices
-    )
 
 
 @dataclass(frozen=True)
@@ -136,18 +121,16 @@ class Tangency:
         return bodies_acted_on(self.system)
 
     @cached_property
-    def _colours(self) -> Numbers:
+    def _colours(self) -> Indices:
         return apart_colours(self._tied)
 
     @cached_property
-    def _sources(self) -> tuple[int, list[Numbers]]:
+    def _sources(self) -> tuple[int, list[Indices]]:
         """Number of computed columns, and for each body those of its coordinates."""
         size = np.array([3 + body.nf for body in self.system.bodies])
-        first, starts = 0, []
-        for colour in range(int(self._colours.max()) + 1):
-            starts.append(first)
-            first += int(size[self._colours == colour].max())
-        return first, [starts[colour] + np.arange(n) for colour, n in zip(self._colours, size, strict=True)]
+        widths = [int(size[self._colours == colour].max()) for colour in range(int(self._colours.max()) + 1)]
+        starts = np.cumsum([0, *widths])
+        return int(starts[-1]), [starts[colour] + np.arange(n) for colour, n in zip(self._colours, size, strict=True)]
 
     @cached_property
     def _force_pattern(self) -> _Pattern:
@@ -163,7 +146,7 @@ class Tangency:
             touched[body].append(row)
         return self._pattern([np.array(rows, dtype=int) for rows in touched], self.system.m)
 
-    def _pattern(self, met: list[Numbers], rows: int) -> _Pattern:
+    def _pattern(self, met: list[Indices], rows: int) -> _Pattern:
         """Return the pattern of a matrix with `rows` rows, given those that the coordinates of each body affect."""
         parts = []
         for body, source, own in zip(self.system.bodies, self._sources[1], met, strict=True):
@@ -186,13 +169,13 @@ class Tangency:
         damping, second_rate = self._columns(point, INDEX_1, VELOCITY)
         stiffness, second_place = self._columns(point, INDEX_1, COORDINATE)
         rate = self._columns(point, _RATES, COORDINATE)[1] if np.any(point.v) else 0.0 * second_place
-        kinds = self.system.packed.rows["kind"]
-        rows, compliant = np.nonzero(kinds == CONSTRAINT)[0], np.nonzero(kinds != CONSTRAINT)[0]
-        held = rows_of(rows, jacobian, rate, second_place, second_rate)
-        place, speed = rows_of(compliant, second_place, second_rate)
+        rows, compliant = np.nonzero(self.system.constrained)[0], np.nonzero(~self.system.constrained)[0]
+        held = (matrix[rows] for matrix in (jacobian, rate, second_place, second_rate))
+        place, speed = second_place[compliant], second_rate[compliant]
         if compliant.size:
             # Directions in which their torques act: the derivatives of angles and travels.
-            springs = scipy.sparse.diags((kinds[compliant] == SPRING).astype(float))
+            kinds = self.system.packed.rows["kind"][compliant]
+            springs = scipy.sparse.diags((kinds == SPRING).astype(float))
             turns = csr_matrix(springs @ place + (scipy.sparse.identity(compliant.size) - springs) @ speed).T
             strength = scipy.sparse.diags(self._strengths(point)[compliant])
             place, speed = csr_matrix(strength @ place), csr_matrix(strength @ speed)

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from paraflex.arrays import Array
-from paraflex.dynamics.points import PointMotion
+from paraflex.dynamics.points import PointMotion, cross
 from paraflex.fem import BeamMesh, SpanProperties
 from paraflex.mechanism import Joint, PointRef
 from paraflex.results.outlines import Outline, turned
@@ -276,7 +276,7 @@ class Cable:
         strain = np.linalg.norm(self._rows(_AXIAL_POINTS, 1) @ q, axis=2) - 1.0
         axial = strain**2 @ self._weights("axial_stiffness", _AXIAL_POINTS)
         first, second = (self._rows(_BENDING_POINTS, order) @ q for order in (1, 2))
-        curvature = _cross(first, second) / np.sum(first**2, axis=2)
+        curvature = cross(first, second) / np.sum(first**2, axis=2)
         return 0.5 * (axial + curvature**2 @ self._weights("bending_stiffness", _BENDING_POINTS))
 
     def rounding(self, reference: Array) -> float:
@@ -343,12 +343,8 @@ def turn_of(start: float, d: Array, v: Array, a: Array) -> AngularMotion:
     angle = np.unwrap(np.arctan2(d[:, 1], d[:, 0]))
     angle += 2.0 * np.pi * np.round((start - angle[:1]) / (2.0 * np.pi))
     square = np.sum(d**2, axis=1)
-    rate = _cross(d, v) / square
-    return AngularMotion(angle, rate, (_cross(d, a) - 2.0 * rate * np.sum(d * v, axis=1)) / square)
-
-
-def _cross(a: Array, b: Array) -> Array:
-    return a[..., 0] * b[..., 1] - a[..., 1] * b[..., 0]
+    rate = cross(d, v) / square
+    return AngularMotion(angle, rate, (cross(d, a) - 2.0 * rate * np.sum(d * v, axis=1)) / square)
 
 
 def _shape(z: Array, length: float, order: int) -> Array:

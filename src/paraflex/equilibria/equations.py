@@ -27,9 +27,8 @@ from paraflex.dynamics.constraints import coordinate_kind
 from paraflex.dynamics.signals import acting_loads
 from paraflex.dynamics.sparse import Saddle, stiffness_diagonal, without_stiffness
 from paraflex.dynamics.stiffness import RestingForces
-from paraflex.dynamics.tangents import MotionPoint, Tangency, rows_of
+from paraflex.dynamics.tangents import MotionPoint, Tangency
 from paraflex.equilibria.conditions import Conditions, Coordinate
-from paraflex.kernel.packed import CONSTRAINT
 from paraflex.linear.coordinates import Coordinates, unit_in, with_coordinates
 from paraflex.linear.independent import independent_dense, independent_sparse
 from paraflex.mechanism import PointRef
@@ -120,7 +119,7 @@ class Equations:
     @cached_property
     def holding(self) -> NDArray[np.int64]:
         """Rows that keep their value or follow a change: constraints, and coordinates held or moved."""
-        own = [k for k in self.own.tolist() if self.extended.packed.rows["kind"][k] == CONSTRAINT]
+        own = [k for k in self.own.tolist() if self.extended.constrained[k]]
         extra = [self.number[one] for one in (*self.conditions.held, *self.conditions.moved)]
         return np.array(list(dict.fromkeys([*own, *extra])), dtype=int)
 
@@ -196,15 +195,14 @@ class Equations:
         point = MotionPoint(self.start.time, at.q, still, still, self.multipliers(at), self._forces.torques)
         found = self._tangency.at(point)
         rows, efforts = self._loaded
-        held, loaded = (rows_of(np.searchsorted(found.rows, selected), found.jacobian)[0]
-                        for selected in (self.holding, rows))  # fmt: skip
+        held, loaded = (found.jacobian[np.searchsorted(found.rows, selected)] for selected in (self.holding, rows))
         stiffness = csr_matrix(found.stiffness + scipy.sparse.diags(self.elastic))
         return Matrices(stiffness, held, -(loaded.T @ efforts), found.mass)
 
     def rows_named(self, coordinates: Sequence[Coordinate], q: Array) -> csr_matrix:
         """Return the derivatives (coordinates, n) of named coordinates."""
         jacobian = self._tangency.inertia(self.start.time, q)[1]
-        return rows_of(np.array([self.number[one] for one in coordinates], dtype=int), jacobian)[0]
+        return jacobian[np.array([self.number[one] for one in coordinates], dtype=int)]
 
     def guess(self) -> Unknowns:
         """Return the start, with the multipliers that hold it best."""

@@ -77,6 +77,15 @@ def eigen_derivatives(values: Numbers, vectors: Numbers, dK: Numbers, dM: Number
     return np.diag(coupling).copy(), vectors @ mixing
 
 
+def is_definite(matrix: Numbers, least: float) -> bool:
+    """Return whether a symmetric matrix, scaled to a unit diagonal, has eigenvalues above a least one only."""
+    diagonal = np.diag(matrix)
+    if not (np.all(np.isfinite(matrix)) and np.all(diagonal > 0.0)):
+        return False
+    sizes = np.sqrt(diagonal)
+    return bool(np.linalg.eigvalsh(matrix / np.outer(sizes, sizes))[0] > least)
+
+
 def _refined(K: Numbers, M: Numbers, values: Numbers, vectors: Numbers) -> tuple[Numbers, Numbers]:
     """Refine all eigenpairs by one step of Ogita and Aishima (2018), so that errors are relative to each eigenvalue.
 

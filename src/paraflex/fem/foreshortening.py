@@ -13,8 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from paraflex.arrays import Array
-from paraflex.fem.element import axial_shape, transverse_shape
-from paraflex.fem.integrals import GAUSS_POINTS, Lump, SpanProperties
+from paraflex.fem.integrals import GAUSS_PLACES, GAUSS_POINTS, GAUSS_WEIGHTS, Lump, SpanProperties
 from paraflex.fem.mesh import BeamMesh
 
 
@@ -63,23 +62,20 @@ def mass_points(mesh: BeamMesh, spans: Sequence[SpanProperties], lumps: Sequence
     basis : (n_nodal, nf) array
         Nodal coordinates per flexible coordinate.
     """
-    z, w = np.polynomial.legendre.leggauss(GAUSS_POINTS)
     n, g = mesh.n_elements, GAUSS_POINTS
     lengths = np.diff(mesh.nodes)
     x, mass, rows, slopes = [], [], [], []
     for e, length in enumerate(lengths):
-        local = 0.5 * length * (z + 1.0)
-        axial = mesh.scatter(e, axial_shape(local, length)) @ basis
-        transverse = mesh.scatter(e, transverse_shape(local, length)) @ basis
-        rows.append(np.stack([axial, transverse], axis=1))
-        slopes.append(mesh.scatter(e, transverse_shape(local, length, derivative=1)) @ basis)
+        local = 0.5 * length * (GAUSS_PLACES + 1.0)
+        rows.append(np.stack([mesh.axial_rows(e, local) @ basis, mesh.transverse_rows(e, local) @ basis], axis=1))
+        slopes.append(mesh.transverse_rows(e, local, derivative=1) @ basis)
         x.append(mesh.nodes[e] + local)
-        mass.append(0.5 * length * w * spans[mesh.spans[e]].mass_per_length)
+        mass.append(0.5 * length * GAUSS_WEIGHTS * spans[mesh.spans[e]].mass_per_length)
     weights = np.zeros((n * g + len(lumps), n * g), dtype=lengths.dtype)
     for e, length in enumerate(lengths):
         own = slice(e * g, (e + 1) * g)
         weights[own, : e * g] = node_weights(mesh, e)[: e * g]
-        weights[own, own] = 0.5 * length * _cumulative(z)
+        weights[own, own] = 0.5 * length * _cumulative(GAUSS_PLACES)
     for k, lump in enumerate(lumps):
         weights[n * g + k] = node_weights(mesh, lump.node)
         shape, slope = mesh.shape_at(mesh.nodes[lump.node])
@@ -120,16 +116,15 @@ def slope_square_integrals(mesh: BeamMesh, basis: Array, x: Array) -> Callable[[
     x : (places,) array
         Positions along the beam, from 0 to its length [m].
     """
-    z, w = np.polynomial.legendre.leggauss(GAUSS_POINTS)
     # Slopes are polynomials within an element, so the intervals end at nodes.
     knots = np.union1d(mesh.nodes, x)
     halves = 0.5 * np.diff(knots)
-    places = knots[:-1, None] + halves[:, None] * (z + 1.0)
+    places = knots[:-1, None] + halves[:, None] * (GAUSS_PLACES + 1.0)
     slopes, ends = mesh.shapes_at(places.ravel())[1] @ basis, np.searchsorted(knots, x)
 
     def integrals(u: Array) -> Array:
         squares = (u @ slopes.T) ** 2
-        pieces = (squares.reshape(len(u), halves.size, z.size) @ w) * halves
+        pieces = (squares.reshape(len(u), halves.size, GAUSS_POINTS) @ GAUSS_WEIGHTS) * halves
         return np.concatenate([np.zeros((len(u), 1)), np.cumsum(pieces, axis=1)], axis=1)[:, ends]
 
     return integrals
@@ -137,9 +132,8 @@ def slope_square_integrals(mesh: BeamMesh, basis: Array, x: Array) -> Callable[[
 
 def node_weights(mesh: BeamMesh, node: int) -> Array:
     """Return the weights (g,) of the Gauss points in f at a node: those of all elements before it, exact."""
-    _, w = np.polynomial.legendre.leggauss(GAUSS_POINTS)
     weights = np.zeros((mesh.n_elements, GAUSS_POINTS), dtype=mesh.nodes.dtype)
-    weights[:node] = 0.5 * np.diff(mesh.nodes)[:node, None] * w
+    weights[:node] = 0.5 * np.diff(mesh.nodes)[:node, None] * GAUSS_WEIGHTS
     return weights.ravel()
 
 

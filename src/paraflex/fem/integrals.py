@@ -9,13 +9,12 @@ from functools import lru_cache
 import numpy as np
 
 from paraflex.arrays import Array
-from paraflex.fem.element import axial_shape, transverse_shape
 from paraflex.fem.mesh import BeamMesh
 from paraflex.fem.reference import ReferenceCondition, reference_basis
 
 # N^T N is of degree 10 in x, exact with six Gauss points.
 GAUSS_POINTS = 6
-_GAUSS = np.polynomial.legendre.leggauss(GAUSS_POINTS)
+GAUSS_PLACES, GAUSS_WEIGHTS = np.polynomial.legendre.leggauss(GAUSS_POINTS)
 
 
 @dataclass(frozen=True)
@@ -104,20 +103,19 @@ class ShapeIntegrals:
         """Constant mass matrix of the flexible coordinates, I2 + Jff."""
         return self.I2 + self.Jff
 
+    @property
+    def mass_matrix(self) -> Array:
+        """Mass matrix of the undeformed body in its frame, for (r, phi, u): (3 + nf, 3 + nf)."""
+        x, y = self.S1
+        rigid = np.array([[self.m, 0.0, -y], [0.0, self.m, x], [-y, x, self.I0 + self.J]])
+        coupling = np.vstack([self.S2, self.G1 + self.Jf])
+        return np.block([[rigid, coupling], [coupling.T, self.Mff]])
+
     def in_basis(self, basis: Array) -> ShapeIntegrals:
         """Transform the body to other flexible coordinates, u_old = basis @ u_new."""
-        return replace(
-            self,
-            S2=self.S2 @ basis,
-            I1=self.I1 @ basis,
-            I2=basis.T @ self.I2 @ basis,
-            G1=self.G1 @ basis,
-            G2=basis.T @ self.G2 @ basis,
-            Jf=self.Jf @ basis,
-            Jff=basis.T @ self.Jff @ basis,
-            K=basis.T @ self.K @ basis,
-            D=self.D @ basis,
-        )
+        rows = {name: getattr(self, name) @ basis for name in ("S2", "I1", "G1", "Jf", "D")}
+        matrices = {name: basis.T @ getattr(self, name) @ basis for name in ("I2", "G2", "Jff", "K")}
+        return replace(self, **rows, **matrices)
 
     def without_flexibility(self) -> ShapeIntegrals:
         """Return the same body as a rigid one, all flexible coordinates held at zero (Remark 3)."""
@@ -137,22 +135,10 @@ def rigid_integrals(mass: float, centre: Sequence[float], inertia: float) -> Sha
         Moment of inertia about the centre of mass [kg m^2].
     """
     c = np.array(centre) * 1.0
-    none, nothing = np.zeros(0), np.zeros((0, 0))
-    return ShapeIntegrals(
-        m=mass,
-        S1=mass * c,
-        S2=np.zeros((2, 0)),
-        I0=inertia + mass * (c @ c).item(),
-        I1=none,
-        I2=nothing,
-        G1=none,
-        G2=nothing,
-        J=0.0,
-        Jf=none,
-        Jff=nothing,
-        K=nothing,
-        D=nothing,
-    )
+    rows = dict.fromkeys(("I1", "G1", "Jf"), np.zeros(0))
+    matrices = dict.fromkeys(("I2", "G2", "Jff", "K", "D"), np.zeros((0, 0)))
+    I0 = inertia + mass * (c @ c).item()
+    return ShapeIntegrals(m=mass, S1=mass * c, S2=np.zeros((2, 0)), I0=I0, J=0.0, **rows, **matrices)
 
 
 def beam_integrals(
@@ -239,11 +225,9 @@ def bar_integrals(
         across = np.outer(N[0], N[1])
         G2 += dm * (across - across.T)
 
-    J, Jf, Jff = 0.0, np.zeros(n, kind), np.zeros((n, n), kind)
-    for slope, inertia in turning:
-        J += inertia
-        Jf += inertia * slope
-        Jff += inertia * np.outer(slope, slope)
+    J = sum((inertia for _, inertia in turning), 0.0)
+    Jf = sum((inertia * slope for slope, inertia in turning), np.zeros(n, kind))
+    Jff = sum((inertia * np.outer(slope, slope) for slope, inertia in turning), np.zeros((n, n), kind))
     return ShapeIntegrals(
         m=m, S1=S1, S2=S2, I0=I0, I1=I1, I2=I2, G1=G1, G2=G2, J=J, Jf=Jf, Jff=Jff, K=stiffness, D=basis
     )
@@ -251,18 +235,15 @@ def bar_integrals(
 
 def _quadrature(mesh: BeamMesh, spans: Sequence[SpanProperties]):
     """Return the mass points (x, N, dm) along the beam and the nodal stiffness matrix (Eq. 28)."""
-    z, w = _GAUSS
     points = []
     kind = np.result_type(mesh.nodes, *(np.array([span.axial_stiffness, span.bending_stiffness]) for span in spans))
     stiffness = np.zeros((mesh.n_nodal, mesh.n_nodal), kind)
     for e in range(mesh.n_elements):
         span = spans[mesh.spans[e]]
         length = mesh.nodes[e + 1] - mesh.nodes[e]
-        x, weight = 0.5 * length * (z + 1.0), 0.5 * length * w
-        axial = mesh.scatter(e, axial_shape(x, length))
-        transverse = mesh.scatter(e, transverse_shape(x, length))
-        strain = mesh.scatter(e, axial_shape(x, length, derivative=1))
-        curvature = mesh.scatter(e, transverse_shape(x, length, derivative=2))
+        x, weight = 0.5 * length * (GAUSS_PLACES + 1.0), 0.5 * length * GAUSS_WEIGHTS
+        axial, transverse = mesh.axial_rows(e, x), mesh.transverse_rows(e, x)
+        strain, curvature = mesh.axial_rows(e, x, derivative=1), mesh.transverse_rows(e, x, derivative=2)
         stiffness += span.axial_stiffness * (strain.T * weight) @ strain
         stiffness += span.bending_stiffness * (curvature.T * weight) @ curvature
         for k in range(x.size):

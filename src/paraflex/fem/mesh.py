@@ -6,9 +6,8 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from paraflex.arrays import Array
+from paraflex.arrays import Array, Indices
 from paraflex.errors import InputError
 from paraflex.fem.element import (
     AXIAL,
@@ -43,7 +42,7 @@ class BeamMesh:
     """
 
     nodes: Array
-    spans: NDArray[np.int64]
+    spans: Indices
     points: Mapping[str, int]
     separate: tuple[int, ...] = ()
 
@@ -99,7 +98,15 @@ class BeamMesh:
         wide[:, columns] = rows
         return wide
 
-    def rows_of(self, coordinate: int) -> NDArray[np.int64]:
+    def axial_rows(self, element: int, x: Array, derivative: int = 0) -> Array:
+        """Return the axial displacement per nodal coordinate, or a derivative, at x (k,) from the first node."""
+        return self.scatter(element, axial_shape(x, self.nodes[element + 1] - self.nodes[element], derivative))
+
+    def transverse_rows(self, element: int, x: Array, derivative: int = 0) -> Array:
+        """Return the transverse displacement per nodal coordinate, or a derivative: see `axial_rows`."""
+        return self.scatter(element, transverse_shape(x, self.nodes[element + 1] - self.nodes[element], derivative))
+
+    def rows_of(self, coordinate: int) -> Indices:
         """Return the indices of one of the four coordinates at every node."""
         return np.arange(coordinate, COORDINATES_PER_NODE * self.nodes.size, COORDINATES_PER_NODE)
 
@@ -121,11 +128,9 @@ class BeamMesh:
             own = elements == element
             if not own.any():
                 continue
-            length = self.nodes[element + 1] - self.nodes[element]
             local = x[own] - self.nodes[element]
-            N[own, 0] = self.scatter(element, axial_shape(local, length))
-            N[own, 1] = self.scatter(element, transverse_shape(local, length))
-            slope[own] = self.scatter(element, transverse_shape(local, length, derivative=1))
+            N[own, 0], N[own, 1] = self.axial_rows(element, local), self.transverse_rows(element, local)
+            slope[own] = self.transverse_rows(element, local, derivative=1)
         return N, slope
 
     def shape_at_node(self, node: int) -> tuple[Array, Array]:

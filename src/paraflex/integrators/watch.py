@@ -8,7 +8,7 @@ import numpy as np
 
 from paraflex.arrays import Array
 from paraflex.dynamics import System, dependence
-from paraflex.dynamics.projection import AGREE, NAMED, contradiction, gap_unit, joint_gaps
+from paraflex.dynamics.projection import AGREE, contradiction, gap_texts
 from paraflex.dynamics.rank import constraint_jacobian
 from paraflex.integrators.methods import Treatment
 from paraflex.kernel.packed import Signals
@@ -83,11 +83,10 @@ def open_constraint(
         return None
     if dependent:
         return Breakdown(contradiction(system, phi, dependence(system, q, count=dependent), "positions"), AGREE)
-    gaps = joint_gaps(system, phi)
-    gap, where = max(gaps.values()), " and ".join(list(gaps)[:NAMED])
+    gap, where = gap_texts(system, phi)
     finer = "choose a finer tolerance, or a shorter step where it is fixed"
     return Breakdown(
-        f"joints come apart, by {gap:.3g} {gap_unit(system, phi)} in {where},",
+        f"joints come apart, by {gap} in {where},",
         f"{finer}, or larger Baumgarte coefficients" if treatment is Treatment.BAUMGARTE else finer,
     )
 

@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from paraflex.arguments import checked_arguments
-from paraflex.arrays import Array
+from paraflex.arrays import Array, Indices, Mask
 from paraflex.dynamics import (
     System,
     assembled_position,
@@ -25,7 +25,7 @@ from paraflex.errors import AssemblyError, InputError, Moment, NumericalError, U
 from paraflex.kernel.arrays import apart
 from paraflex.kernel.closure import LOOPS_CLOSED, LOOPS_SINGULAR, close_path, make_closure_scratch, task_values
 from paraflex.kernel.packed import MARKER, PackedSystem, Signals
-from paraflex.kinematics.paths import FixedPoint, Path, PathMotion, turning_of
+from paraflex.kinematics.paths import KnownPath, Path, PathMotion, turning_of
 from paraflex.kinematics.reach import PoseSearch, Shortfall
 from paraflex.limits import INSTANTS, solvable
 from paraflex.mechanism import Assembly, Mechanism, PointRef, with_actuators
@@ -166,7 +166,8 @@ def pose_at(
     InputError, AssemblyError, UnreachablePathError
         See `follow_path`.
     """
-    return path_follower(mechanism, FixedPoint(position), 0.0, assembly=assembly, orientation=orientation)([0.0]).q[0]
+    still = KnownPath(PathMotion(np.array([position]), np.zeros((1, 2)), np.zeros((1, 2))))
+    return path_follower(mechanism, still, 0.0, assembly=assembly, orientation=orientation)([0.0]).q[0]
 
 
 @checked_arguments()
@@ -192,7 +193,17 @@ def path_follower(
     PathFollower
         Callable that returns the motion at times (k,), ascending [s].
     """
-    return PathFollower(*_assembled(mechanism, path, end, assembly, orientation), path)
+    if mechanism.end_effector is None:
+        raise InputError("the mechanism has no end-effector", field="end_effector", remedy="name its point")
+    closure = PathClosure(mechanism.rigid(), orientation, end)
+    chosen = assembly if isinstance(assembly, Assembly) else mechanism.assembly(assembly)
+    closure.check_degrees_of_freedom(chosen)
+    if turning_of(path, np.zeros(1)) is not None and "angle" not in mechanism.end_effector.coordinates:
+        raise InputError(
+            "the path gives angles, but the task has none", field="end_effector.coordinates",
+            value=list(mechanism.end_effector.coordinates), remedy='name "angle", or leave the angles out',
+        )  # fmt: skip
+    return PathFollower(closure, closure.assemble(chosen), path)
 
 
 @dataclass(frozen=True)
@@ -225,23 +236,6 @@ class PathFollower:
         return replace(self, path=path)
 
 
-def _assembled(
-    mechanism: Mechanism, path: Path, end: float, assembly: str | Assembly | None, orientation: float
-) -> tuple[PathClosure, Array]:
-    """Return the closure along a path, and the pose of the assembly; errors as in `follow_path`."""
-    if mechanism.end_effector is None:
-        raise InputError("the mechanism has no end-effector", field="end_effector", remedy="name its point")
-    closure = PathClosure(mechanism.rigid(), orientation, end)
-    chosen = assembly if isinstance(assembly, Assembly) else mechanism.assembly(assembly)
-    closure.check_degrees_of_freedom(chosen)
-    if turning_of(path, np.zeros(1)) is not None and "angle" not in mechanism.end_effector.coordinates:
-        raise InputError(
-            "the path gives angles, but the task has none", field="end_effector.coordinates",
-            value=list(mechanism.end_effector.coordinates), remedy='name "angle", or leave the angles out',
-        )  # fmt: skip
-    return closure, closure.assemble(chosen)
-
-
 def reach_shortfall(
     mechanism: Mechanism,
     path: Path,
@@ -269,14 +263,14 @@ def reach_shortfall(
     InputError, AssemblyError
         Same causes as in `follow_path`.
     """
-    closure, pose = _assembled(mechanism, path, path.duration, assembly, orientation)
+    follower = path_follower(mechanism, path, path.duration, assembly=assembly, orientation=orientation)
+    closure, pose = follower.closure, follower.assembled
     if times is None:
         return closure.shortfall(path, 0.0, path.duration, pose)
-    times = np.asarray(times, dtype=float)
-    return closure.reach.shortfall(times, closure.target(path, times)[:, 0], pose, closure.other_poses())
+    return closure.distances(path, np.asarray(times, dtype=float), pose)
 
 
-def _no_long_steps(times: Array) -> tuple[Array, NDArray[np.bool_]]:
+def _no_long_steps(times: Array) -> tuple[Array, Mask]:
     """Return times refined to the longest closure step, and which of them were given."""
     pieces = np.maximum(1.0, np.ceil(np.diff(times) / _LONGEST_STEP * (1.0 - 1e-9)))
     if np.sum(pieces) > INSTANTS:
@@ -311,7 +305,7 @@ class PathClosure:
         self.orientation = orientation
         end = end if end > 0.0 else 1.0
         self.signals: Signals = still_signals(self.system.mechanism, end)[0]
-        self.coordinates: NDArray[np.int64] = np.array([TASK_COORDINATES.index(name) for name in effector.coordinates])
+        self.coordinates: Indices = np.array([TASK_COORDINATES.index(name) for name in effector.coordinates])
         self.packed, self.marker = with_marker(self.system, effector.point)
         self.reach: PoseSearch = PoseSearch(self.system, effector.point, self.coordinates, self.signals)
 
@@ -354,18 +348,16 @@ class PathClosure:
         full = np.concatenate([np.stack(motion), turning[:, :, None]], axis=2)
         return np.ascontiguousarray(full[:, :, self.coordinates].transpose(1, 0, 2))
 
-    def run(
-        self, times: Array, target: Array, pose: Array
-    ) -> tuple[int, int, float, tuple[Array, Array, Array, Array]]:
-        """Close the loops along targets; return status, index, residual, and the computed arrays."""
+    def run(self, times: Array, target: Array, pose: Array) -> tuple[int, int, tuple[Array, Array, Array, Array]]:
+        """Close the loops along targets; return status, index, and the computed arrays."""
         k, n = times.size, self.system.n
         q, v, a = apart((3, k, n))
         basis = apart((k, n, self.coordinates.size))
         q[0] = pose
         scratch = make_closure_scratch(self.packed, self.coordinates.size, self.signals.start.size)
         given = (self.packed, self.signals, self.marker, self.coordinates, times, target)
-        status, index, residual = close_path(*given, q, v, a, basis, scratch)
-        return status, int(index), residual, (q, v, a, basis)
+        status, index, _ = close_path(*given, q, v, a, basis, scratch)
+        return status, int(index), (q, v, a, basis)
 
     def approach(self, path: Path, pose: Array, start: float, end: float) -> Array:
         """Move the end-effector from the assembly to the start of the path, staying in that assembly."""
@@ -376,7 +368,7 @@ class PathClosure:
             fractions = np.linspace(0.0, 1.0, steps + 1)
             target = np.zeros((steps + 1, 3, goal.size))
             target[:, 0] = here + fractions[:, None] * (goal - here)
-            status, index, _, (q, *_) = self.run(np.zeros(steps + 1), target, pose)
+            status, index, (q, *_) = self.run(np.zeros(steps + 1), target, pose)
             if status == LOOPS_CLOSED:
                 return q[-1]
             reached = q[index - 1] if index else reached
@@ -386,12 +378,12 @@ class PathClosure:
             cause, detail = "the path's start is not reached from the assembly's pose", _OTHER
         raise self._unreachable(cause, detail, found, start, 0, None)
 
-    def walk(self, path: Path, pose: Array, grid: Array, keep: NDArray[np.bool_]) -> RigidMotion:
+    def walk(self, path: Path, pose: Array, grid: Array, keep: Mask) -> RigidMotion:
         """Return the motion at the instants of a grid, with further instants where steps are too long."""
         intervals = []
         while True:
             target = self.target(path, grid)
-            status, index, _, found = self.run(grid, target, pose)
+            status, index, found = self.run(grid, target, pose)
             last = index - 1
             if status in (LOOPS_CLOSED, LOOPS_SINGULAR) or last < 0 or grid[index] - grid[last] < _SHORTEST_STEP:
                 break
@@ -422,17 +414,20 @@ class PathClosure:
         end = max(start, min(end, path.duration))
         knots = [knot for knot in path.knots if start < knot < end]
         times = np.unique([*np.linspace(start, end, _INSTANTS_LOOKED_AT), *knots])
-        others = self.other_poses()
-        found = self.reach.shortfall(times, self.target(path, times)[:, 0], pose, others)
+        found = self.distances(path, times, pose)
         k = found.furthest
         if not found.out[k] or times.size < 2:
             return found
         span = times[max(k - 1, 0)], times[min(k + 1, times.size - 1)]
         closer = np.setdiff1d(np.linspace(*span, _MORE_LOOKS + 2)[1:-1], times)
-        return found.joined(self.reach.shortfall(closer, self.target(path, closer)[:, 0], pose, others))
+        return found.joined(self.distances(path, closer, pose))
 
-    def other_poses(self) -> list[Array]:
-        """Return the poses of the assemblies that close."""
+    def distances(self, path: Path, times: Array, pose: Array) -> Shortfall:
+        """Return the distances of a path from the workspace at some times, from a pose or the assemblies that close."""
+        return self.reach.shortfall(times, self.target(path, times)[:, 0], pose, self._other_poses)
+
+    @cached_property
+    def _other_poses(self) -> list[Array]:
         poses = []
         for assembly in self.mechanism.assemblies:
             with suppress(AssemblyError):

@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields
 from functools import cached_property
 from itertools import pairwise
 from math import pi
-from typing import NamedTuple, Protocol, runtime_checkable
+from typing import Any, NamedTuple, Protocol, runtime_checkable
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
 from paraflex.arguments import CheckedFields, checked_arguments, named_in_errors
-from paraflex.arrays import Array
+from paraflex.arrays import Array, Numbers
 from paraflex.errors import InputError
 from paraflex.kinematics.profiles import CruiseProfile, TrapezoidalProfile
 from paraflex.limits import PATH_POINTS, at_most
@@ -92,11 +91,10 @@ class Polygon(CheckedFields):
         corners = _points(self.corners, "corners", 2)
         object.__setattr__(self, "corners", tuple(map(tuple, corners.tolist())))
         positive(self.max_acceleration, "max_acceleration", "m/s^2")
-        for length in self._lengths:
-            if not length > 0.0:
-                raise InputError(
-                    "two neighbouring corners coincide", field="corners", value=self.corners, remedy="drop one of them"
-                )
+        if not np.all(self._lengths > 0.0):
+            raise InputError(
+                "two neighbouring corners coincide", field="corners", value=self.corners, remedy="drop one of them"
+            )
 
     @cached_property
     def _vertices(self) -> Array:
@@ -161,25 +159,25 @@ def Line(start: Sequence[float], end: Sequence[float], max_acceleration: float) 
 
 
 @dataclass(frozen=True)
-class FixedPoint:
-    """Path that stays at a position [m]."""
+class KnownPath:
+    """Path known at some times only, possibly with a complex step."""
 
-    position: tuple[float, float]
-
-    @property
-    def duration(self) -> float:
-        """See `Path.duration`."""
-        return 0.0
+    motion: PathMotion
+    angles: Numbers | None = None
+    duration: float = 0.0
 
     @property
     def knots(self) -> tuple[float, ...]:
-        """See `Path.knots`."""
-        return ()
+        """Start and end, as a path known at some times has no knots between them."""
+        return (0.0, self.duration)
 
     def evaluate(self, t: Array) -> PathMotion:
-        """See `Path.evaluate`."""
-        still = np.zeros((len(t), 2))
-        return PathMotion(still + self.position, still, still)
+        """Return the motion at the known times; `t` is not used."""
+        return self.motion
+
+    def turning(self, t: Array) -> Numbers | None:
+        """Return the angle of the end-effector and its derivatives if the path prescribes it, else None."""
+        return self.angles
 
 
 @dataclass(frozen=True)
@@ -546,28 +544,20 @@ class SequencePath(CheckedFields):
 
     def evaluate(self, t: Array) -> PathMotion:
         """Return the motion at times t [s]."""
-        t = np.atleast_1d(np.asarray(t, dtype=float))
-        out = np.zeros((3, t.size, 2))
-        for here, path, time in self._each(t):
-            out[:, here] = path.evaluate(time)
-        return PathMotion(*out)
+        return PathMotion(*self._joined(t, (2,), lambda path, time: path.evaluate(time)))
 
     def turning(self, t: Array) -> Array | None:
         """Return the end-effector's angle [rad], its rate and acceleration at times t (3, k); None without angles."""
-        t = np.atleast_1d(np.asarray(t, dtype=float))
-        if turning_of(self.paths[0], t[:1]) is None:
-            return None
-        out = np.zeros((3, t.size))
-        for here, path, time in self._each(t):
-            out[:, here] = turning_of(path, time)
-        return out
+        return None if turning_of(self.paths[0], np.zeros(1)) is None else self._joined(t, (), turning_of)
 
-    def _each(self, t: Array) -> Iterator[tuple[NDArray[np.bool_], Path, Array]]:
-        """Yield for each path the mask of its times, the path, and these times counted from its start."""
-        which = np.searchsorted(self._starts[1:-1], t, side="right")
+    def _joined(self, t: Array, columns: tuple[int, ...], of: Callable[[Path, Array], Any]) -> Array:
+        """Return values and two derivatives (3, k, ...) at times t, each of its path at the time since its start."""
+        t = np.atleast_1d(np.asarray(t, dtype=float))
+        which, out = np.searchsorted(self._starts[1:-1], t, side="right"), np.zeros((3, t.size, *columns))
         for k, path in enumerate(self.paths):
             if np.any(which == k):
-                yield which == k, path, t[which == k] - self._starts[k]
+                out[:, which == k] = of(path, t[which == k] - self._starts[k])
+        return out
 
 
 def turning_of(path: Path, t: Array) -> Array | None:

@@ -7,9 +7,8 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from paraflex.arrays import Array
+from paraflex.arrays import Array, Indices, Mask
 from paraflex.dynamics import System
 from paraflex.dynamics.joint_coordinates import material_angle
 from paraflex.dynamics.points import marker_place
@@ -77,12 +76,12 @@ class Shortfall:
     own: Array
 
     @property
-    def out(self) -> NDArray[np.bool_]:
+    def out(self) -> Mask:
         """Mask (k,) of instants at which no pose reaches the position."""
         return (self.distance > 0.0) | (self.turn > 0.0)
 
     @property
-    def elsewhere(self) -> NDArray[np.bool_]:
+    def elsewhere(self) -> Mask:
         """Mask (k,) of instants at which poses reach the position, but none near the pose before."""
         return ~self.out & (self.own > 0.0)
 
@@ -124,7 +123,7 @@ class PoseSearch:
 
     system: System
     point: PointRef
-    coordinates: NDArray[np.int64]
+    coordinates: Indices
     signals: Signals
 
     def nearest(self, t: float, goal: Array, q: Array) -> NearestPose:
@@ -220,17 +219,12 @@ class PoseSearch:
 
     def _change_at(self, q: Array) -> LeastChange:
         """Return the dimensionless least change; dense, as a search closes thousands of poses."""
-        jacobian, units, row_units = self._jacobian(q), self.system.units, self.system.row_units
+        jacobian, units, row_units = self.system.dimensionless_jacobian(q), self.system.units, self.system.row_units
         return lambda phi: units * np.linalg.lstsq(jacobian, phi / row_units, rcond=_DEPENDENT)[0]
-
-    def _jacobian(self, q: Array) -> Array:
-        """Return the dimensionless Phi_q."""
-        return self.system.jacobian(q) * self.system.units / self.system.row_units[:, None]
 
     def _slope(self, q: Array, goal: Array, multipliers: Array | None = None) -> tuple[Array, Array]:
         """Return the gradient of half the squared distance, or of the Lagrangian with multipliers; and Phi_q."""
-        values, rows = self._task(q)
-        jacobian = self._jacobian(q)
+        (values, rows), jacobian = self._task(q), self.system.dimensionless_jacobian(q)
         slope = (rows * self.system.units / self._units[:, None]).T @ ((values - goal) / self._units)
         return (slope if multipliers is None else slope + jacobian.T @ multipliers), jacobian
 

@@ -90,27 +90,25 @@ def _residual_change(
     """Return the derivative of the residuals along a change of the motion, and the Jacobians of the motion itself."""
     total = np.zeros((*motion.q.shape, 3 + closure.coordinates.size))
     target = closure.target(motion.path, motion.t)
-    here, jacobians = _residuals(closure, closure.packed, closure.signals, motion.t, target, motion)
+    nominal = DisplacedClosure(0.0, 0.0, closure.packed, closure.signals, motion.t, target)
+    here, jacobians = _residuals(closure, nominal, motion)
     for near in nearby:
         moved = MotionChange(
             *(x + near.place * dx for x, dx in zip((motion.q, motion.v, motion.a, motion.basis), change, strict=True))
         )
-        found, _ = _residuals(closure, near.packed, near.signals, near.times, near.target, moved)
+        found, _ = _residuals(closure, near, moved)
         # Subtracting the nominal residuals cancels the rounding of entries that do not change.
         total += near.weight * (found - here)
     return total, jacobians
 
 
-def _residuals(
-    closure: PathClosure, packed: PackedSystem, signals: Signals, times: Array, target: Array,
-    motion: RigidMotion | MotionChange,
-) -> tuple[Array, Array]:  # fmt: skip
+def _residuals(closure: PathClosure, near: DisplacedClosure, motion: RigidMotion | MotionChange) -> tuple[Array, Array]:
     k, n = motion.q.shape
     tasks = closure.coordinates.size
     out, jacobians = apart((k, n, 3 + tasks)), apart((k, n, n))
-    arrays = (np.ascontiguousarray(x) for x in (times, target, motion.q, motion.v, motion.a, motion.basis))
+    arrays = (np.ascontiguousarray(x) for x in (near.times, near.target, motion.q, motion.v, motion.a, motion.basis))
     closure_residuals(
-        packed, signals, closure.marker, closure.coordinates, *arrays, out, jacobians,
-        make_closure_scratch(packed, tasks, signals.start.size),
+        near.packed, near.signals, closure.marker, closure.coordinates, *arrays, out, jacobians,
+        make_closure_scratch(near.packed, tasks, near.signals.start.size),
     )  # fmt: skip
     return out, jacobians

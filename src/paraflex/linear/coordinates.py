@@ -22,10 +22,9 @@ from scipy.sparse import csr_matrix
 from paraflex.arrays import Array
 from paraflex.dynamics import System, joint_coordinate, material_angle
 from paraflex.dynamics.constraints import coordinate_kind
-from paraflex.dynamics.linearise import Inertia
 from paraflex.dynamics.points import marker_place
 from paraflex.dynamics.system import with_constraints_of
-from paraflex.dynamics.tangents import MotionPoint, Tangency, Tangents, rows_of
+from paraflex.dynamics.tangents import MotionPoint, Tangency, Tangents
 from paraflex.errors import InputError
 from paraflex.linear.independent import independent_dense, independent_sparse
 from paraflex.mechanism import GROUND, ConstantSpeed, Mechanism, PointRef, PrescribedAngle, RevoluteJoint
@@ -121,7 +120,7 @@ class RowTangents(NamedTuple):
 
     def taken(self, rows: NDArray[np.int64]) -> RowTangents:
         """Return the tangents of some of the rows."""
-        return RowTangents(*rows_of(rows, *self[:4]), number=self.number[rows])
+        return RowTangents(*(part[rows] for part in self[:4]), number=self.number[rows])
 
     def with_rows(self, others: RowTangents) -> RowTangents:
         """Return the tangents of these rows followed by others."""
@@ -210,13 +209,13 @@ class Coordinates:
     def _rows_of(self, joints: Sequence[str]) -> NDArray[np.int64]:
         return np.array([self._rows[0][joint] for joint in joints], dtype=int)
 
-    def inertia(self, time: float, q: Array, joints: Sequence[str]) -> Inertia:
+    def inertia(self, time: float, q: Array, joints: Sequence[str]) -> tuple[csr_matrix, csr_matrix, csr_matrix]:
         """Return mass matrix, constraint rows and joint rows at coordinates q (n,)."""
         mass, jacobian = self.tangency.inertia(time, q)
         number = self._rows[1]
         own = np.nonzero(number >= 0)[0]
         constraints, rows = own[np.argsort(number[own])], self._rows_of(joints)
-        return Inertia(mass, *rows_of(constraints, jacobian), *rows_of(rows, jacobian))
+        return mass, jacobian[constraints], jacobian[rows]
 
     def at(self, point: MotionPoint) -> PointTangents:
         """Compute the tangent matrices at an operating point."""
@@ -230,13 +229,13 @@ class Coordinates:
         def rows(selected: NDArray[np.int64]) -> RowTangents:
             at = np.searchsorted(whole.rows, selected)
             parts = (whole.jacobian, whole.rate, whole.second_place, whole.second_rate)
-            return RowTangents(*rows_of(at, *parts), number=number[selected])
+            return RowTangents(*(part[at] for part in parts), number=number[selected])
 
         # No row of the fictitious pin is a constraint, whether it is a coordinate or not.
         pin = [k for k, name in enumerate(names) if name.startswith(_TASK)]
         holding = whole.rows[~np.isin(whole.rows, [*self._rows_of(self.joints), *coordinates, *pin])]
         motors = self._rows_of([motor.joint for motor in self.system.mechanism.motors])
-        acting = rows_of(np.searchsorted(whole.rows, motors), whole.jacobian)[0]
+        acting = whole.jacobian[np.searchsorted(whole.rows, motors)]
         return PointTangents(whole, rows(holding), rows(coordinates), number[whole.compliant], acting)
 
     def choose(self, tangents: PointTangents, without: Collection[int] = ()) -> CoordinateChoice:

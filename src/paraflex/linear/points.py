@@ -11,7 +11,6 @@ from paraflex.dynamics.signals import acting_loads
 from paraflex.dynamics.sparse import sparse_jacobian
 from paraflex.dynamics.stiffness import RestingForces
 from paraflex.dynamics.tangents import MotionPoint
-from paraflex.kernel.packed import CONSTRAINT
 from paraflex.linear.coordinates import Coordinates
 from paraflex.mechanism import ActuationMode
 from paraflex.motion import MotionRun
@@ -31,7 +30,7 @@ def resting_point(coordinates: Coordinates, state: State, mode: ActuationMode) -
     system = coordinates.system
     active = [(k, motor.joint) for k, motor in enumerate(system.mechanism.motors) if motor.name in mode.motors]
     joints = list(dict.fromkeys(joint for _, joint in active))
-    found = forces_at_rest(system, state, coordinates.inertia(state.time, state.q, joints))
+    found = forces_at_rest(system, state, *coordinates.inertia(state.time, state.q, joints))
     efforts = dict(zip(joints, found.efforts, strict=True))
     torques = _acting(system, state.time, {k: efforts[joint] for k, joint in active})
     still = np.zeros(system.n)
@@ -55,7 +54,7 @@ def planned_point(task: TrackingTask, mode: ActuationMode, sample: int) -> Motio
     for motor, effort in zip(system.mechanism.motors, efforts, strict=True):
         left = left - effort * joint_coordinate(system, motor.joint, q[None]).rows[0]
     moving = np.concatenate([np.arange(body.offset, body.offset + 3) for body in system.bodies])
-    rows = np.nonzero(system.packed.rows["kind"] == CONSTRAINT)[0]
+    rows = np.nonzero(system.constrained)[0]
     jacobian = sparse_jacobian(system, q)[rows][:, moving].toarray()
     lam[rows] = np.linalg.lstsq(jacobian.T, -left[moving], rcond=None)[0]
     return MotionPoint(time, q, v, a, lam, _acting(system, time, dict(enumerate(efforts))))

@@ -210,8 +210,8 @@ class FlexibleBeam(DeformableBody):
         return 1 if self.elements is None else self.elements
 
     def _spans_of(self, mesh: BeamMesh) -> tuple[SpanProperties, ...]:
-        sections = _per_span(self.section, mesh.n_spans, "section")
-        materials = _per_span(self.material, mesh.n_spans, "material")
+        sections = per_span(self.section, mesh.n_spans, "section")
+        materials = per_span(self.material, mesh.n_spans, "material")
         return tuple(map(span_properties, sections, materials))
 
 
@@ -224,7 +224,8 @@ def span_properties(section: Section, material: Material) -> SpanProperties:
     )
 
 
-def _per_span(value: T | tuple[T, ...], count: int, field: str) -> tuple[T, ...]:
+def per_span(value: T | tuple[T, ...], count: int, field: str) -> tuple[T, ...]:
+    """Return one value per span, from one for all of them or one for each."""
     if not isinstance(value, tuple):
         return (value,) * count
     if len(value) != count:

@@ -119,6 +119,11 @@ def _finite_or_profile(values: InTime | tuple[InTime, ...], field: str) -> None:
     finite([each for each in several if not isinstance(each, TimeProfile)], field)
 
 
+def value_in_time(given: InTime, t: Array) -> Array:
+    """Return a constant, or the value of a profile, at times t [s]."""
+    return given.evaluate(t)[0] if isinstance(given, TimeProfile) else np.full(t.shape, given)
+
+
 @dataclass(frozen=True)
 class _Load(CheckedFields):
     """Base class of loads."""
@@ -150,9 +155,7 @@ class _Load(CheckedFields):
             A profile does not cover a time or is not finite there.
         """
         try:
-            each = [
-                one.evaluate(t)[0] if isinstance(one, TimeProfile) else np.full(t.shape, one) for one in self.components
-            ]
+            each = [value_in_time(one, t) for one in self.components]
         except InputError as error:
             raise error.within(f"load.{self.name}") from None
         return np.stack(each, axis=1)

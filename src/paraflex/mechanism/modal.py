@@ -11,6 +11,7 @@ import numpy as np
 from paraflex.arguments import CheckedFields
 from paraflex.errors import InputError
 from paraflex.fem import ShapeIntegrals
+from paraflex.fem.eigen import is_definite
 from paraflex.mechanism.damping import Damping
 from paraflex.mechanism.quantities import in_unit, positive
 
@@ -179,12 +180,9 @@ def _check_definite(s: ShapeIntegrals) -> None:
     """Check that mass matrix and stiffness of the undeformed body and Mff - I2 are positive (semi-)definite."""
     _definite(s.Mff, "mass_matrix", "check it for coordinates that others make up")
     _definite(s.K, "stiffness", "leave out coordinates that move the body as a whole: its frame does that")
-    rigid = np.array([[s.m, 0.0, -s.S1[1]], [0.0, s.m, s.S1[0]], [-s.S1[1], s.S1[0], s.I0]])
-    _definite(rigid, "inertia", "check mass, first_moment and inertia: the latter is about the frame's origin")
-    coupling = np.vstack([s.S2, s.G1])
-    _definite(
-        np.block([[rigid, coupling], [coupling.T, s.Mff]]), "mass_matrix", "check S2 and G1: they couple too much"
-    )
+    whole = s.mass_matrix
+    _definite(whole[:3, :3], "inertia", "check mass, first_moment and inertia: the latter is about the frame's origin")
+    _definite(whole, "mass_matrix", "check S2 and G1: they couple too much")
     sizes = np.sqrt(np.diag(s.Mff))
     if np.linalg.eigvalsh(s.Jff / np.outer(sizes, sizes))[0] < -_ASYMMETRY:
         raise InputError(
@@ -193,12 +191,8 @@ def _check_definite(s: ShapeIntegrals) -> None:
 
 
 def _definite(matrix: np.ndarray, field: str, remedy: str) -> None:
-    diagonal = np.diag(matrix)
-    if np.all(diagonal > 0.0):
-        sizes = np.sqrt(diagonal)
-        if np.linalg.eigvalsh(matrix / np.outer(sizes, sizes))[0] > _SMALLEST_EIGENVALUE:
-            return
-    raise InputError("is not positive definite", field=field, remedy=remedy)
+    if not is_definite(matrix, _SMALLEST_EIGENVALUE):
+        raise InputError("is not positive definite", field=field, remedy=remedy)
 
 
 def _symmetric(matrix: np.ndarray, field: str, sign: float = 1.0) -> np.ndarray:

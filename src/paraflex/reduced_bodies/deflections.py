@@ -50,8 +50,7 @@ class PlannedDeflections:
         motion = task.motion
         self.task: TrackingTask = task
         self.samples: list[int] = _instants(motion.t, task.path.duration)
-        states = [undeformed_at(task.system, motion, k) for k in self.samples]
-        self._q, self._v, self._a = (np.array(part) for part in zip(*states, strict=True))
+        self._q, self._v, self._a = undeformed_at(task.system, motion, self.samples)
         self._structures = [_Structure(task.system, pose) for pose in self._q]
 
     def of_mode(self, mode: ActuationMode) -> Array:

@@ -115,7 +115,14 @@ def bases_of(system: System, deflections: Sequence[Array], count: int) -> dict[s
     InputError
         The count exceeds the number of flexible coordinates, or of independent directions in the deflections.
     """
-    _check(system, count)
+    if not system.n_flexible:
+        raise InputError("has rigid bodies only", field="mechanism", value=system.mechanism.name,
+                         remedy="give it flexible ones")  # fmt: skip
+    if not 1 <= count <= system.n_flexible:
+        raise InputError(
+            "no such number of flexible coordinates", field="coordinates", value=count,
+            remedy=f"from 1 to {system.n_flexible}",
+        )  # fmt: skip
     together = normalised_by_energy(system, deflections)
     found = []
     for body in system.bodies:
@@ -136,17 +143,6 @@ def bases_of(system: System, deflections: Sequence[Array], count: int) -> dict[s
         for body in system.bodies
         if body.nf
     }
-
-
-def _check(system: System, count: int) -> None:
-    if not system.n_flexible:
-        raise InputError("has rigid bodies only", field="mechanism", value=system.mechanism.name,
-                         remedy="give it flexible ones")  # fmt: skip
-    if not 1 <= count <= system.n_flexible:
-        raise InputError(
-            "no such number of flexible coordinates", field="coordinates", value=count,
-            remedy=f"from 1 to {system.n_flexible}",
-        )  # fmt: skip
 
 
 def normalised_by_energy(system: System, parts: Sequence[Array]) -> Array:

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from paraflex.arrays import Array
 from paraflex.dynamics import Marker, System, end_markers, joint_coordinate, material_angle, sensor_readings
 from paraflex.dynamics.joint_loads import (
-    LoadErrors,
+    LoadComponents,
     drive_torques,
     frame_load,
     joint_loads,
@@ -48,14 +48,14 @@ class Links:
         of the constraint rows of the mechanism's system; speeds of motors; energies and work; deformed shapes. Only
         some models have coordinates of joints, torques and speeds of prescribed motions, loads on the ground, section
         forces and readings of sensors.
-    load_errors : LoadErrors, optional
+    load_errors : LoadComponents, optional
         Bounds of the integration errors of joint and drive loads; None if unknown.
     sections : Sections, optional
         Sections of the beams; None for models without shape functions, and without flexible beams.
     """
 
     variables: Variables
-    load_errors: LoadErrors | None = None
+    load_errors: LoadComponents | None = None
     sections: Sections | None = None
 
     def __getitem__(self, name: str) -> NDArray[np.floating]:

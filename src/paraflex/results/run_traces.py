@@ -14,8 +14,7 @@ from paraflex.control.loop.run_loop import ControllerRecord
 from paraflex.control.loop.runs import ControlledMotion, ControlledTracking
 from paraflex.dynamics import System, joint_coordinate
 from paraflex.dynamics.joint_loads import (
-    LoadErrors,
-    UndeterminedLoads,
+    LoadComponents,
     drive_torques,
     joint_loads,
     load_errors,
@@ -95,7 +94,7 @@ class SolutionTraces(Generic[R]):
         return np.where(self._undetermined.force.any(axis=2), np.nan, length(force))
 
     @cached_property
-    def load_errors(self) -> LoadErrors:
+    def load_errors(self) -> LoadComponents:
         """Bounds of the integration errors of joint and drive loads; NaN if unknown."""
         errors = self.solution.multiplier_errors
         return load_errors(self.system, self._joints, np.full(self.system.m, np.nan) if errors is None else errors)
@@ -111,7 +110,7 @@ class SolutionTraces(Generic[R]):
         return self.run.controllers if isinstance(self.run, ControlledTracking | ControlledMotion) else ()
 
     @cached_property
-    def _undetermined(self) -> UndeterminedLoads:
+    def _undetermined(self) -> LoadComponents:
         return undetermined_loads(self.system, self._joints, self.solution.q.real, self.solution.acting)
 
     @property

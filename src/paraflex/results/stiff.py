@@ -19,7 +19,7 @@ from paraflex.dynamics.joint_coordinates import joint_coordinate
 from paraflex.dynamics.signals import no_signals
 from paraflex.errors import InputError, NumericalError
 from paraflex.kernel.constraints import constraint_values, fill_jacobian
-from paraflex.kernel.packed import CONSTRAINT, make_scratch
+from paraflex.kernel.packed import make_scratch
 from paraflex.mechanism import Mechanism
 from paraflex.results.outlines import Outline
 
@@ -92,7 +92,7 @@ def _closed(system: System, drawn: Sequence[Outline], q: Array, driven: Mapping[
 
     Each step is the one of least displacement of the stations. Return None without convergence.
     """
-    rows = (system.packed.rows["kind"] == CONSTRAINT) & (system.packed.rows["signal"] < 0)
+    rows = system.constrained & (system.packed.rows["signal"] < 0)
     units = np.concatenate([
         system.row_units[rows], [system.size if system.mechanism.joint(name).slides else 1.0 for name in driven],
     ])  # fmt: skip

@@ -9,8 +9,8 @@ import numpy as np
 from paraflex.arrays import Array
 from paraflex.dynamics import BodyCoordinates, System
 from paraflex.fem import ReferenceCondition
-from paraflex.fem.element import AXIAL, transverse_shape
-from paraflex.fem.integrals import GAUSS_POINTS
+from paraflex.fem.element import AXIAL
+from paraflex.fem.integrals import GAUSS_PLACES, GAUSS_POINTS, GAUSS_WEIGHTS
 from paraflex.integrators import Solution
 from paraflex.kernel.packed import POINT
 from paraflex.mechanism import AssumedModesBeam, Body, FlexibleBeam
@@ -18,7 +18,6 @@ from paraflex.mechanism.bodies import span_properties
 
 # Coordinates with less than this fraction of the stiffness of uniform stretch do not give the axial force.
 _STRETCHES = 0.5
-_POINTS, _WEIGHTS = np.polynomial.legendre.leggauss(GAUSS_POINTS)
 
 
 class Bending(NamedTuple):
@@ -91,9 +90,9 @@ def _line(body: BodyCoordinates, described: Body) -> _Line:
     if isinstance(described, FlexibleBeam):
         mesh, spans = described.mesh, described.spans
         lengths = np.diff(mesh.nodes)
-        weights = (0.5 * lengths[:, None] * _WEIGHTS).ravel()
-        places = [0.5 * length * (_POINTS + 1.0) for length in lengths]
-        rows = [mesh.scatter(e, transverse_shape(x, lengths[e], derivative=1)) for e, x in enumerate(places)]
+        weights = (0.5 * lengths[:, None] * GAUSS_WEIGHTS).ravel()
+        places = [0.5 * length * (GAUSS_PLACES + 1.0) for length in lengths]
+        rows = [mesh.transverse_rows(e, x, derivative=1) for e, x in enumerate(places)]
         stretch = np.diff(D[mesh.rows_of(AXIAL)], axis=0) / lengths[:, None]
         stiffness = np.array([spans[span].axial_stiffness for span in mesh.spans])
         each = np.repeat(np.arange(lengths.size), GAUSS_POINTS)

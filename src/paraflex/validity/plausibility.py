@@ -19,7 +19,6 @@ from paraflex.findings import RESOLVED, Finding
 from paraflex.formatting import speed_text
 from paraflex.integrators import METHODS, IntegrationOptions, Solution
 from paraflex.integrators.method import NativeMethod
-from paraflex.kernel.packed import CONSTRAINT
 from paraflex.mechanism import Assembly, Mechanism, PointForce, approximate_poses, grouped
 from paraflex.units import STRESS
 from paraflex.validity.bending import bending_of
@@ -366,7 +365,7 @@ def _large_forces(where: _Context, system: System, solution: Solution) -> Iterat
     expected, turning = _expected(system, where.mechanism, float(np.median(np.max(accelerations, axis=0))), solution.t)
     # Entries are NaN at singular configurations, and for rows without multipliers in a method.
     sustained = np.quantile(np.nan_to_num(np.abs(solution.multipliers)), 1.0 - _PEAK_SHARE, axis=0)
-    sustained[system.packed.rows["kind"] != CONSTRAINT] = 0.0
+    sustained[~system.constrained] = 0.0
     arms = np.array([size if row.endswith(" angle") else 1.0 for row in system.rows])
     forces = sustained / arms
     k = int(np.argmax(forces))

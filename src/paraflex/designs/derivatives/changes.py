@@ -37,6 +37,7 @@ from paraflex.kernel.bodies import motion_forces
 from paraflex.kernel.packed import Signals, make_scratch
 from paraflex.kinematics import Circle, PathMotion, Polygon, RigidMotion
 from paraflex.kinematics.closure import PathClosure, with_marker
+from paraflex.kinematics.paths import KnownPath
 from paraflex.kinematics.sensitivity import DisplacedClosure, MotionChange, motion_sensitivity
 from paraflex.mechanism import ActuationMode, FlexibleBeam, Mechanism, RigidBody, with_actuators
 from paraflex.tracking import TrackingTask, path_knots
@@ -54,28 +55,6 @@ class DescribedInputs(NamedTuple):
     end: float
     orientation: float
     gains: tuple[float, float]
-
-
-@dataclass(frozen=True)
-class KnownPath:
-    """Path known at some times only, with a complex step."""
-
-    motion: PathMotion
-    angles: Numbers | None
-    duration: float
-
-    @property
-    def knots(self) -> tuple[float, ...]:
-        """Start and end, as a path known at some times has no knots between them."""
-        return (0.0, self.duration)
-
-    def evaluate(self, t: Array) -> PathMotion:
-        """Return the motion at the known times; `t` is not used."""
-        return self.motion
-
-    def turning(self, t: Array) -> Numbers | None:
-        """Return the angle of the end-effector and its derivatives if the path prescribes it, else None."""
-        return self.angles
 
 
 @dataclass(frozen=True)

@@ -129,7 +129,7 @@ class RigidInverse(StartedLaw):
     def _motion(self, t: float, place: Array, velocity: Array, acceleration: Array, near: Array) -> RigidMotion:
         """Return the motion of the rigid mechanism with this motion of the end-effector, near a pose."""
         target = np.ascontiguousarray(np.stack([place, velocity, acceleration])[None])
-        status, _, _, (q, v, a, basis) = self._closure.run(np.zeros(1), target, near)
+        status, _, (q, v, a, basis) = self._closure.run(np.zeros(1), target, near)
         if status != LOOPS_CLOSED:
             raise ArithmeticError("the rigid mechanism cannot take the pose that its encoders read")
         plan = self._plan
