@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import fields
 from typing import Any, cast
 
 from paraflex.control.shaping.shaped import ShapedPath
@@ -95,10 +94,7 @@ def _joint(name: str, entry: list[str] | JointTable) -> Joint:
     # Fields of another kind of joint are rejected, because they would have no effect.
     kind = JOINT_KINDS[entry.type]
     given = {key: getattr(entry, key) for key in entry.model_fields_set - {"type", "points"}}
-    own = {each.name: each for each in fields(kind)[3:]}
-    check_fields(
-        given, own, f"{entry.type} joint", f"joint.{name}", lambda each: each.metadata.get("description", "it")
-    )
+    check_fields(kind, given, f"{entry.type} joint", f"joint.{name}", "name", "a", "b")
     return kind(name, a, b, **given)
 
 

@@ -6,7 +6,7 @@ field (positive lengths, points that exist) are checked once, in `mechanism.chec
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import MISSING, fields
 from enum import Enum
 from functools import reduce
@@ -33,9 +33,29 @@ from paraflex.control.laws.kinds import LAWS
 from paraflex.equilibria.conditions import FACTORS, STEPS
 from paraflex.files.expressions import CONSTANTS, ExpressionError, check_in_time, evaluate
 from paraflex.limits import LARGEST, TEXT_LETTERS, WHOLE
-from paraflex.mechanism import JOINT_KINDS, Mechanism, PointRef, groups_of
+from paraflex.mechanism import (
+    JOINT_KINDS,
+    AssumedModesBeam,
+    Damping,
+    Deflection,
+    EndEffector,
+    FlexibleBeam,
+    LumpedMass,
+    Material,
+    Mechanism,
+    ModalBody,
+    ModalPoint,
+    Payload,
+    PointRef,
+    RigidBody,
+    Section,
+    ShapeFunction,
+    groups_of,
+)
+from paraflex.mechanism.bodies import BODY_KINDS
 from paraflex.mechanism.loads import InTime
 from paraflex.mechanism.quantities import joint_pair
+from paraflex.mechanism.sections import SHAPES
 
 
 def _number(value: Any, info: ValidationInfo) -> Any:
@@ -209,10 +229,13 @@ def _written(hint: Any) -> Any:
     return list[_written(inner[0])]
 
 
-def _fields_of(member: type, *, needed: bool = True, without: Sequence[str] = ("name",)) -> dict[str, Any]:
+def _fields_of(
+    member: type, *, needed: bool = True, without: Sequence[str] = ("name",), **written: Any
+) -> dict[str, Any]:
     """Return the fields of a member's table from those of its class, with two points or joints in one field.
 
-    If `needed` is False, all fields become optional.
+    If `needed` is False, all fields become optional. `written` are types of fields that files write in another way than
+    their annotations say; such a field is None by default if it may be.
     """
     hints, found = get_type_hints(member), {}
     together = [*without]
@@ -224,15 +247,30 @@ def _fields_of(member: type, *, needed: bool = True, without: Sequence[str] = ("
         found["joints"] = (TwoJoints, Field(description=f"[{', '.join(pair)}]"))
         together += joints
     for each in fields(member):
-        if each.name not in together:
+        if each.name in together:
+            continue
+        hint, description = hints[each.name], each.metadata.get("description", f"its {each.name}")
+        if hint in _IN_TIME:
+            found |= _in_time(hint, each.name, description)
+        elif hint == tuple[ShapeFunction, ...]:
+            found |= _of_shapes(each.name)
+        else:
+            kind = written.get(each.name) or _written(hint)
             default = each.default if each.default_factory is MISSING else each.default_factory()
             default = (... if needed else None) if default is MISSING else getattr(default, "value", default)
-            description = each.metadata.get("description", f"its {each.name}")
-            if hints[each.name] in _IN_TIME:
-                found |= _in_time(hints[each.name], each.name, description)
-                continue
-            found[each.name] = (_written(hints[each.name]), Field(default, description=description))
+            if each.name in written and NoneType in get_args(kind):
+                default = None
+            found[each.name] = (kind, Field({} if default == () and get_origin(kind) is dict else default,
+                                            description=description))  # fmt: skip
     return found
+
+
+def _of_shapes(direction: str) -> dict[str, Any]:
+    """Return the fields of a table for the shape functions of a bar in a direction."""
+    return {
+        f"{direction}_sines": (Count, _optional("the number of shapes sin(n pi z), n = 1, 2, ...", 0)),
+        f"{direction}_polynomials": (list[list[Number]], _optional("a list of coefficients, ascending in z", [])),
+    }
 
 
 def _choice(words: Sequence[str], known: Sequence[str]) -> Any:
@@ -241,176 +279,89 @@ def _choice(words: Sequence[str], known: Sequence[str]) -> Any:
     return Literal[tuple(words)], Field(description=f"{', '.join(quoted[:-1])} or {quoted[-1]}")
 
 
-def _member_table(members: Sequence[Any], base: type[_Table] = _Table) -> Any:
+def _table_of(one: Any, kinds: Mapping[str, Any] | None = None, base: type[_Table] = _Table, **others: Any) -> Any:
+    """Return the table of a class, with the fields of a base table as well, and with a `type` if it is one of kinds."""
+    entries = _fields_of(one, **others)
+    if kinds and len(kinds) > 1:
+        entries = {"type": _choice([kind for kind, each in kinds.items() if each is one], list(kinds))} | entries
+    about = one.__doc__.partition("\n\n")[0]
+    return create_model(f"{one.__name__}Table", __base__=base, __doc__=about, **entries)
+
+
+def _member_table(kinds: Mapping[str, Any], base: type[_Table] = _Table) -> Any:
     """Return the table of a member that belongs to one of several classes, with the fields of a base table as well."""
-    tables = []
-    for one in members:
-        entries = _fields_of(one)
-        if len(members) > 1:
-            entries = {"type": _choice([one.kind], [each.kind for each in members])} | entries
-        about = one.__doc__.partition("\n\n")[0]
-        tables.append(create_model(f"{one.__name__}Table", __base__=base, __doc__=about, **entries))
+    tables = [_table_of(one, kinds, base) for one in kinds.values()]
     return tables[0] if len(tables) == 1 else Annotated[reduce(or_, tables), Field(discriminator="type")]
 
 
-def _joint_table() -> Any:
-    """Return the table of a joint of any kind, with the fields of all kinds, all of them optional."""
-    found = {"type": _choice(list(JOINT_KINDS), list(JOINT_KINDS))}
-    for kind in JOINT_KINDS.values():
-        found = found | {name: one for name, one in _fields_of(kind, needed=False).items() if name not in found}
-    return create_model("JointTable", __base__=_Table, __doc__="A joint of any kind between two points.", **found)
+def _table_of_any(kinds: Iterable[type], **entries: Any) -> Any:
+    """Return a table with some entries and with the fields of several classes, all of them optional."""
+    for kind in kinds:
+        entries |= _fields_of(kind, needed=False, without=("name", *entries))
+    return create_model("AnyTable", __base__=_Table, **entries)
 
 
-class SectionTable(_Table):
+class SectionTable(
+    _table_of_any(
+        [*SHAPES.values(), Section],
+        shape=(
+            Literal["rectangle", "round", "tube"] | None,
+            _optional('"rectangle", "round" or "tube"; by default a rectangle, or by area and second_moment'),
+        ),
+    )
+):
     """A cross-section, given by its shape or by its properties; the fields depend on the shape."""
 
-    shape: Literal["rectangle", "round", "tube"] | None = _optional(
-        '"rectangle", "round" or "tube"; by default a rectangle, or by area and second_moment'
-    )
-    width: Number | None = _optional("the width out of the plane of motion in m")
-    thickness: Number | None = _optional("the thickness in the plane of motion in m")
-    diameter: Number | None = _optional("the outer diameter in m")
-    wall: Number | None = _optional("the thickness of the wall of a hollow section in m")
-    area: Number | None = _optional("the area in m^2")
-    second_moment: Number | None = _optional("the second moment of area in m^4")
-    outer_fibre: Number | None = _optional("the distance of the outermost fibre from the neutral axis in m")
 
-
-class MaterialTable(_Table):
+class MaterialTable(_table_of(Material)):
     """A material."""
 
-    youngs_modulus: Number = Field(description="Young's modulus in Pa")
-    density: Number = Field(description="the density in kg/m^3")
-    strength: Number | None = _optional("the largest admissible stress in Pa")
 
-
-class LumpTable(_Table):
+class LumpTable(_table_of(LumpedMass, without=("point",))):
     """A lumped mass."""
 
-    mass: Number = Field(description="the mass in kg")
-    inertia: Number = _optional("the moment of inertia in kg m^2", 0.0)
 
-
-class DampingTable(_Table):
+class DampingTable(_table_of_any(get_args(Damping))):
     """Structural damping of a body: modal damping ratios, a loss factor, or Rayleigh damping."""
 
-    ratios: list[Number] = _optional(
-        "the damping ratio of each mode of the body as its joints hold it; the last applies to all others", []
-    )
-    loss_factor: Number = _optional("twice the damping ratio at the frequency, of stiffness-proportional damping", 0.0)
-    frequency: Number = _optional("the frequency in Hz at which the loss factor holds", 0.0)
-    mass: Number = _optional("the mass-proportional coefficient in 1/s, of the body as it is held", 0.0)
-    stiffness: Number = _optional("the stiffness-proportional coefficient in s", 0.0)
+
+class ModalPointTable(_table_of(ModalPoint, position=Pair)):
+    """A point of a body given by its matrices."""
 
 
+_WRITTEN |= {
+    Section: Text, Material: Text, tuple[LumpedMass, ...]: dict[str, Text], Damping | None: DampingTable | None,
+    ModalPoint: ModalPointTable,
+}  # fmt: skip
 ReferenceName = Literal["pinned", "cantilever", "free"]
 CurvatureName = Literal["separate", "shared"]
-ReductionName = Literal["modal", "craig-bampton"]
 
 
-class BeamTable(_Table):
+class BeamTable(_table_of(FlexibleBeam, BODY_KINDS, reference=ReferenceName | None, curvature=CurvatureName | None)):
     """A flexible beam along its x axis."""
 
-    type: Literal["beam"] = Field(description='"beam", "rigid", "assumed-modes" or "modal"')
-    length: Number = Field(description="the length in m")
-    section: Text | list[Text] = Field(description="the name of a [section.NAME] table, or one per span")
-    material: Text | list[Text] = Field(description="the name of a [material.NAME] table, or one per span")
-    points: dict[str, Number] = _optional("the distance of each named point from the start in m", {})
-    elements: Count | list[Count] | None = _optional(
-        "elements per span, one number or one per span; by default 1, and where a joint slides along "
-        "the beam enough that none is longer than a third of it"
-    )
-    lumps: dict[str, Text] = _optional("the name of a [lump.NAME] table for each point", {})
-    reference: ReferenceName | None = _optional(
-        'how its frame is fixed to the beam: "pinned", "cantilever" or "free"; the model\'s by default'
-    )
-    curvature: CurvatureName | None = _optional(
-        'curvature at lumped moments of inertia: "separate" or "shared"; the model\'s by default'
-    )
-    modes: Count | None = _optional("the number of modes of lowest frequency to keep")
-    reduction: ReductionName = _optional(
-        'the reduction basis with modes: "modal", modes in its frame; "craig-bampton", modes with its joints '
-        "held, and static shapes of these",
-        "modal",
-    )
-    damping: DampingTable | None = _optional("a damping table")
-    flexible: Yes = _optional("false for a rigid beam", True)
-    frames: Count = _optional(
-        "the number of floating frames of equal length, joined rigidly: more for large deflections", 1
-    )
 
-
-class RigidTable(_Table):
+class RigidTable(_table_of(RigidBody, BODY_KINDS)):
     """A rigid body."""
 
-    type: Literal["rigid"] = Field(description='"beam", "rigid", "assumed-modes" or "modal"')
-    mass: Number = Field(description="the mass in kg")
-    inertia: Number = Field(description="the moment of inertia about the centre of mass in kg m^2")
-    centre_of_mass: Pair = _optional("[x, y] in the body frame in m", [0.0, 0.0])
-    points: dict[str, Pair] = _optional("[x, y] of each named point in the body frame in m", {})
+
+class AssumedModesTable(_table_of(AssumedModesBeam, BODY_KINDS)):
+    """A beam along its x axis that deforms in given shape functions of z = x/length."""
 
 
-if TYPE_CHECKING:
+class ModalTable(_table_of(ModalBody, BODY_KINDS, first_moment=Pair)):
+    """A flexible body given by its matrices."""
 
-    class JointTable(_Table):
-        """Fields common to all joints."""
 
-        type: str
-        points: list[str]
-else:
-    JointTable = _joint_table()
+class JointTable(_table_of_any(JOINT_KINDS.values(), type=_choice(list(JOINT_KINDS), list(JOINT_KINDS)))):
+    """A joint of any kind between two points."""
+
 
 # A revolute joint may be written as its two points alone. The tags are chosen such that errors do not show them.
 JointEntry = Annotated[
     Annotated[TwoPoints, Tag("list[point]")] | Annotated[JointTable, Tag("JointTable")],
     Discriminator(lambda value: "JointTable" if isinstance(value, dict) else "list[point]"),
 ]
-
-
-class AssumedModesTable(_Table):
-    """A beam along its x axis that deforms in given shape functions of z = x/length."""
-
-    type: Literal["assumed-modes"] = Field(description='"beam", "rigid", "assumed-modes" or "modal"')
-    length: Number = Field(description="the length in m")
-    section: Text = Field(description="the name of a [section.NAME] table")
-    material: Text = Field(description="the name of a [material.NAME] table")
-    transverse_sines: Count = _optional("the number of shapes sin(n pi z), n = 1, 2, ...", 0)
-    transverse_polynomials: list[list[Number]] = _optional("a list of coefficients, ascending in z", [])
-    axial_sines: Count = _optional("the number of shapes sin(n pi z), n = 1, 2, ...", 0)
-    axial_polynomials: list[list[Number]] = _optional("a list of coefficients, ascending in z", [])
-    points: dict[str, Number] = _optional("the distance of each named point from the start in m", {})
-    lumps: dict[str, Text] = _optional("the name of a [lump.NAME] table for each point", {})
-    modes: Count | None = _optional("the number of modes of lowest frequency to keep")
-    damping: DampingTable | None = _optional("a damping table")
-    flexible: Yes = _optional("false for a rigid bar", True)
-
-
-class ModalPointTable(_Table):
-    """A point of a body given by its matrices."""
-
-    position: Pair = Field(description="[x, y] in the body frame in m")
-    shape: list[list[Number]] = Field(description="two rows, displacement along x and y per flexible coordinate")
-    slope: list[Number] = Field(description="the rotation per flexible coordinate")
-
-
-class ModalTable(_Table):
-    """A flexible body given by its matrices."""
-
-    type: Literal["modal"] = Field(description='"beam", "rigid", "assumed-modes" or "modal"')
-    mass: Number = Field(description="the mass in kg")
-    first_moment: Pair = Field(description="[x, y], mass times the centre of mass in kg m")
-    inertia: Number = Field(description="the moment of inertia about the body frame's origin in kg m^2")
-    mass_matrix: list[list[Number]] = Field(description="rows of the mass matrix of the flexible coordinates")
-    stiffness: list[list[Number]] = Field(description="rows of the stiffness matrix")
-    S2: list[list[Number]] = Field(description="two rows, int N dm")
-    I1: list[Number] = Field(description="int s0^T N dm")
-    G1: list[Number] = Field(description="int (x N_y - y N_x) dm")
-    G2: list[list[Number]] = Field(description="rows of the skew int (N_x^T N_y - N_y^T N_x) dm")
-    I2: list[list[Number]] | None = _optional("rows of int N^T N dm")
-    points: dict[str, ModalPointTable] = _optional("position, shape and slope of each named point", {})
-    modes: Count | None = _optional("the number of modes of lowest frequency to keep")
-    damping: DampingTable | None = _optional("a damping table")
-    flexible: Yes = _optional("false for a rigid body", True)
 
 
 class PieceTable(_Table):
@@ -456,12 +407,8 @@ class AssemblyTable(BaseModel):
         return dict(self.__pydantic_extra__ or {})
 
 
-class DeflectionTable(_Table):
+class DeflectionTable(_table_of(Deflection)):
     """Deflection of a point of a beam from its undeformed position in the body frame."""
-
-    axial: Number | None = _optional("the displacement along the beam in m")
-    transverse: Number | None = _optional("the displacement across the beam in m")
-    slope: Number | None = _optional("the slope in rad")
 
 
 class CoordinatesTable(_Table):
@@ -500,22 +447,12 @@ class StartTable(_Table):
     rates: dict[str, RatesTable] = _optional("rates of x, y, phi and flexible of bodies", {})
 
 
-class EndEffectorTable(_Table):
+class EndEffectorTable(_table_of(EndEffector)):
     """The end-effector, a point that follows a path."""
 
-    point: Text = Field(description='"body.point"')
-    coordinates: list[Text] = _optional('task coordinates from "x", "y", "angle"', ["x", "y"])
 
-
-class PayloadTable(_Table):
+class PayloadTable(_table_of(Payload)):
     """A payload fixed to the point of the end-effector."""
-
-    mass: Number = Field(description="the mass in kg")
-    inertia: Number = _optional("the moment of inertia about its centre of mass in kg m^2", 0.0)
-    offset: Pair = _optional(
-        "[x, y] in m from the end-effector's point to its centre of mass, in the frame of the body that carries it",
-        [0.0, 0.0],
-    )
 
 
 class ShaperTable(_Table):
@@ -630,7 +567,7 @@ _CONTROLLER = create_model(
 if TYPE_CHECKING:
     AnyControllerTable = Any
 else:
-    AnyControllerTable = _member_table(list(LAWS.values()), _CONTROLLER)
+    AnyControllerTable = _member_table(LAWS, _CONTROLLER)
 
 
 class StudyDefaultsTable(_Table):
@@ -736,7 +673,9 @@ class _Parts(_Table):
 
 
 _GROUPS: dict[str, Any] = {
-    one.table: (dict[str, _member_table(one.kinds)], {}) for one in groups_of(Mechanism).values() if one.kinds
+    one.table: (dict[str, _member_table({getattr(kind, "kind", ""): kind for kind in one.kinds})], {})
+    for one in groups_of(Mechanism).values()
+    if one.kinds
 }
 _WithGroups = create_model("_WithGroups", __base__=_Parts, **_GROUPS)
 

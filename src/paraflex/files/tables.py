@@ -37,9 +37,10 @@ from paraflex.mechanism import (
     TimeProfile,
     grouped,
 )
+from paraflex.mechanism.bodies import BODY_KINDS
 from paraflex.mechanism.quantities import joint_pair
 
-_BODIES = {RigidBody: "rigid", FlexibleBeam: "beam", AssumedModesBeam: "assumed-modes", ModalBody: "modal"}
+_BODIES = {kind: name for name, kind in BODY_KINDS.items()}
 # Properties of beams that a file may give once for all of them, at its top, with their defaults.
 _SHARED = {"reference": "pinned", "curvature": "separate"}
 # Tables to which bodies refer by name, with the field of a body that holds the names.

@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from contextlib import contextmanager
 from typing import TypeVar
 
-from paraflex.errors import InputError, suggestion
+from paraflex.errors import InputError, suggestion, within
 from paraflex.fem import Polynomial, mesh_beam
 from paraflex.limits import ELEMENTS
 from paraflex.mechanism.bodies import AssumedModesBeam, Body, ComponentModes, FlexibleBeam, RigidBody
 from paraflex.mechanism.damping import Damping, stiffness_damping
 from paraflex.mechanism.modal import ModalBody
-from paraflex.mechanism.quantities import check_numbers, finite, positive
+from paraflex.mechanism.quantities import check_numbers, finite
 
 T = TypeVar("T")
 
@@ -26,14 +25,13 @@ def check_body(body: Body) -> None:
         The first check that fails.
     """
     field = f"body.{body.name}"
+    check_numbers(body, field)
     if isinstance(body, RigidBody):
-        check_numbers(body, field)
         for name, position in body.points.items():
             finite(position, f"{field}.points.{name}")
         return
     if isinstance(body, ModalBody):
-        check_numbers(body, field)
-        with _within(field):
+        with within(field):
             _ = body.integrals
             for name in body.points:
                 body.point(name)
@@ -44,7 +42,7 @@ def check_body(body: Body) -> None:
         n = body.n_flexible
     else:
         _check_bar(body, field)
-        with _within(field):
+        with within(field):
             n = body.mesh.n_flexible
         _check_frames(body, field)
     check_damping(body.damping, f"{field}.damping")
@@ -89,13 +87,12 @@ def check_damping(damping: Damping | None, field: str) -> None:
 
 
 def _check_bar(body: FlexibleBeam | AssumedModesBeam, field: str) -> None:
-    positive(body.length, f"{field}.length", "m")
     for where, section in _each(body.section, f"{field}.section"):
         check_numbers(section, where)
     for where, material in _each(body.material, f"{field}.material"):
         check_numbers(material, where)
     finite(body.points.values(), f"{field}.points")
-    with _within(field):
+    with within(field):
         mesh_beam(body.length, body.points, body.counts if isinstance(body, FlexibleBeam) else 1)
     for lump in body.lumps:
         if lump.point not in body.points:
@@ -123,14 +120,5 @@ def _check_shapes(body: AssumedModesBeam, field: str) -> None:
                 if not function.coefficients:
                     raise InputError("has no coefficients", field=f"{field}.{kind}", remedy="give at least one")
                 finite(function.coefficients, f"{field}.{kind}")
-    with _within(field):
+    with within(field):
         _ = body.integrals
-
-
-@contextmanager
-def _within(field: str) -> Iterator[None]:
-    """Add the body to the field that an error names."""
-    try:
-        yield
-    except InputError as error:
-        raise error.within(field) from error

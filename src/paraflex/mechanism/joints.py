@@ -184,7 +184,7 @@ class RevoluteJoint(Joint, kind="revolute", holds=("points",)):
 
 
 _DIRECTION = field_metadata("the angle of its axis against the first body in rad", finite)
-_LENGTH = field_metadata("the constant distance in m, by default that of the first assembly", positive, "m")
+_LENGTH = field_metadata("the constant distance in m, by default that of the first assembly", positive)
 _ANGLE = field_metadata("the angle of the second body against the first in rad", finite)
 
 
@@ -230,7 +230,7 @@ class SlidingJoint(Joint, kind="sliding", holds=("axis",), symbol="sliding", fol
         Action of a run when point b reaches an end of the beam; an error by default.
     """
 
-    at_end: AtEnd = optional(  # noqa: RUF009 - a field
+    at_end: AtEnd = optional(
         AtEnd.ERROR, 'where a sliding point comes to the end of its beam: "error", "stop", "warn" or "ignore"'
     )
 

@@ -100,9 +100,9 @@ class LinearSpring(CheckedFields):
     name: str
     a: PointRef
     b: PointRef
-    stiffness: float = field(metadata=field_metadata("the stiffness in N/m", not_negative, "N/m"))
-    length: float = optional(0.0, "the free length in m", not_negative, "m")
-    damping: float = optional(0.0, "the damping in N s/m", not_negative, "N s/m")
+    stiffness: float = field(metadata=field_metadata("the stiffness in N/m", not_negative))
+    length: float = optional(0.0, "the free length in m", not_negative)
+    damping: float = optional(0.0, "the damping in N s/m", not_negative)
 
 
 InTime = float | TimeProfile

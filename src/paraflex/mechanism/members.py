@@ -26,7 +26,7 @@ from paraflex.mechanism.loads import (
     TorsionalSpring,
 )
 from paraflex.mechanism.payload import Payload
-from paraflex.mechanism.quantities import joints_named, known
+from paraflex.mechanism.quantities import field_metadata, joints_named, known, optional
 from paraflex.mechanism.sensors import SENSOR_KINDS, Sensor
 
 TASK_COORDINATES = ("x", "y", "angle")
@@ -39,8 +39,8 @@ class EndEffector(CheckedFields):
     _table = "end_effector"
 
     _own = ("coordinates",)
-    point: PointRef
-    coordinates: tuple[str, ...] = ("x", "y")
+    point: PointRef = field(metadata=field_metadata('"body.point"'))
+    coordinates: tuple[str, ...] = optional(("x", "y"), 'task coordinates from "x", "y", "angle"')
 
     def __post_init__(self) -> None:
         super().__post_init__()
