@@ -415,19 +415,13 @@ def load_path(file: str | FilePath) -> Path:
 def _model(table: ModelTable, data: dict[str, Any], source: str, text: str) -> Model:
     mechanism = read_mechanism(table)
     paths = read_paths(table.path)
-    values = dict(table.study) | {
-        "paths": tuple(table.study.paths),
-        "modes": tuple(table.study.modes),
-        "orientation": table.study.orientation or 0.0,
-        "torques": read_torques(table),
-        "controllers": tuple(table.study.controllers),
-    }
+    torques = read_torques(table)
     with within("study"):
-        values["shaper"] = None if table.study.shaper is None else read_shaper(table.study.shaper)
-    study = StudyDefaults(**values)
+        shaper = None if table.study.shaper is None else read_shaper(table.study.shaper)
+    study = StudyDefaults(**dict(table.study) | {"torques": torques, "shaper": shaper})
     check_study(mechanism, paths, study)
     turns = mechanism.end_effector is not None and "angle" in mechanism.end_effector.coordinates
-    if table.study.orientation is not None and not turns:
+    if "orientation" in table.study.model_fields_set and not turns:
         raise InputError(
             "the angle is not a task coordinate", field="study.orientation", value=table.study.orientation,
             remedy='name "angle" among the coordinates of [end_effector], or leave it out',
@@ -444,10 +438,7 @@ def _model(table: ModelTable, data: dict[str, Any], source: str, text: str) -> M
 
 
 def _statics(table: ModelTable, mechanism: Mechanism) -> StaticsDefaults:
-    values = dict(table.statics)
-    for name in ("held", "stiffness"):
-        values[name] = None if values[name] is None else tuple(values[name])
-    found = StaticsDefaults(**values)
+    found = StaticsDefaults(**dict(table.statics))
     with within("statics"):
         conditions(mechanism, found)
     return found

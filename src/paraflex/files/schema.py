@@ -16,6 +16,7 @@ from types import NoneType, UnionType
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Union, get_args, get_origin, get_type_hints
 
 from pydantic import (
+    AfterValidator,
     BaseModel,
     BeforeValidator,
     ConfigDict,
@@ -30,8 +31,10 @@ from pydantic_core import PydanticCustomError
 
 from paraflex.control.laws.described import ControllerDescription, References
 from paraflex.control.laws.kinds import LAWS
-from paraflex.equilibria.conditions import FACTORS, STEPS
+from paraflex.control.shaping.shapers import Shaper
+from paraflex.equilibria.conditions import StaticsDefaults
 from paraflex.files.expressions import CONSTANTS, ExpressionError, check_in_time, evaluate
+from paraflex.files.study import StudyDefaults
 from paraflex.limits import LARGEST, TEXT_LETTERS, WHOLE
 from paraflex.mechanism import (
     JOINT_KINDS,
@@ -175,7 +178,7 @@ def _in_time(hint: Any, name: str, description: str) -> dict[str, Any]:
     return {
         name: (
             written | None,
-            _optional(f"{description}, numbers or expressions of the time t"),
+            _optional(description),
         ),
         "pieces": (pieces | None, _optional(example)),
         "table": (rows | None, _optional(f"a list of {columns} such columns")),
@@ -226,7 +229,8 @@ def _written(hint: Any) -> Any:
         return dict[Text, _written(inner[1])]
     if origin is tuple and inner[1:] != (...,):
         return tuple[*map(_written, inner)]
-    return list[_written(inner[0])]
+    many = list[_written(inner[0])]
+    return Annotated[many, AfterValidator(tuple)] if origin is tuple else many
 
 
 def _fields_of(
@@ -537,15 +541,12 @@ PathTable = Annotated[
 ]
 
 
-class TorqueTable(_Table):
-    """The torque of a motor as a profile: an expression, pieces or a table."""
-
-    torque: FunctionOfTime | None = _optional("the torque in N m, an expression of the time t")
-    pieces: Annotated[list[TorquePiece], Field(min_length=1)] | None = _optional(
-        "a list of { until = s, torque = ... }, the last without until"
+class TorqueTable(
+    create_model(
+        "_Torque", __base__=_Table, **_in_time(InTime, "torque", "the torque in N m, an expression of the time t")
     )
-    table: Rows | None = _optional("a list of [t, torque] in s and N m, or the name of a file with two such columns")
-    interpolation: InterpolationName | None = _INTERPOLATION
+):
+    """The torque of a motor as a profile: an expression, pieces or a table."""
 
 
 # A number or an expression of the time, or a table. The tags are chosen such that errors do not show them.
@@ -570,50 +571,11 @@ else:
     AnyControllerTable = _member_table(LAWS, _CONTROLLER)
 
 
-class StudyDefaultsTable(_Table):
-    """Default settings of `paraflex run`."""
+_WRITTEN |= {Mapping[str, InTime]: dict[str, TorqueEntry], Shaper | None: ShaperTable | None}
 
-    path: Text | None = _optional("the name of a [path.NAME] table")
-    paths: list[Text] = _optional(
-        "several names in place of path: runs and studies of many designs take all, others the first", []
-    )
-    modes: list[Text] = _optional("actuation modes by name, signs or motor names", [])
-    duration: Number | None = _optional("the duration in s, dwell included")
-    samples: Count = _optional("the number of samples kept", 701)
-    assembly: Text | None = _optional("the name of an [assembly.NAME] table")
-    torques: dict[str, TorqueEntry] = _optional(
-        "torques of motors in N m, without a path: numbers, expressions of the time t, or tables", {}
-    )
-    controllers: list[Text] = _optional(
-        "names of active [controller.NAME] tables, in addition to torques planned along a path", []
-    )
-    shaper: ShaperTable | None = _optional(
-        'the input shaper of torques planned along a path, as { type = "zvd", frequencies = ["9 Hz"] }: none by default'
-    )
-    orientation: Number | None = _optional(
-        "the end-effector's angle along the path in rad, where it is a task coordinate"
-    )
-    method: Text | None = _optional("the method of integration, by default esdirk5: see paraflex methods")
-    tolerance: Number | None = _optional(
-        "the tolerance of the integration in m, 4e-5 of the mechanism's size by default"
-    )
-    tolerance_per: Literal["cycle", "run"] | None = _optional(
-        'the time over which errors may accumulate to it: a "cycle" of the motion or the "run"; own methods only'
-    )
-    control: Literal["positions", "forces"] | None = _optional(
-        'the errors that control the steps: "positions", or "forces" as well, the default of damped beams and '
-        "ESDIRK methods"
-    )
-    step: Number | None = _optional("a fixed step in s, with methods that take one")
-    after: Literal["free", "hold"] = _optional(
-        'what the active motors do after the path: "free" or "hold", by brakes', "free"
-    )
-    reduced: Count | None = _optional(
-        "the number of flexible coordinates kept, all bodies together; all by default, or with 0"
-    )
-    error: Literal["motion", "whole"] = _optional(
-        'the tracking error that ranks modes: of the "motion", or the "whole" run with dwell', "motion"
-    )
+
+class StudyDefaultsTable(_table_of(StudyDefaults)):
+    """Default settings of `paraflex run`."""
 
 
 def _quoted(value: Any) -> Any:
@@ -627,22 +589,8 @@ def _quoted(value: Any) -> Any:
 NumbersByName = Annotated[dict[str, Number], BeforeValidator(_quoted, json_schema_input_type=dict[str, float | str])]
 
 
-class StaticsTable(_Table):
+class StaticsTable(_table_of(StaticsDefaults, loads=NumbersByName, torques=NumbersByName, moved=NumbersByName)):
     """Default settings of `paraflex statics`."""
-
-    loads: NumbersByName = _optional(
-        'the force in N or torque in N m at each joint, "body.point.x", ".y" or ".angle"', {}
-    )
-    torques: NumbersByName = _optional("the torque of each motor in N m", {})
-    moved: NumbersByName = _optional(
-        'the travel in m or rad of each joint, "body.point.x", ".y" or ".angle" from the start', {}
-    )
-    held: list[Text] | None = _optional("coordinates held fixed; by default the joints of motors without a torque")
-    steps: Count = _optional("the number of equal steps of loads and travels", STEPS)
-    stiffness: list[Text] | None = _optional(
-        "coordinates whose stiffness is computed; by default those loaded or moved"
-    )
-    buckling: Count = _optional("the number of buckling factors about every equilibrium", FACTORS)
 
 
 class _Parts(_Table):

@@ -170,7 +170,11 @@ class PointForce(_Load):
     kind: ClassVar[str] = "force"
     unit: ClassVar[str] = "N"
 
-    force: tuple[InTime, InTime] = field(metadata=field_metadata("[x, y] in the ground frame in N", _finite_or_profile))
+    force: tuple[InTime, InTime] = field(
+        metadata=field_metadata(
+            "[x, y] in the ground frame in N, numbers or expressions of the time t", _finite_or_profile
+        )
+    )
 
 
 @dataclass(frozen=True)
@@ -180,7 +184,9 @@ class AppliedTorque(_Load):
     kind: ClassVar[str] = "torque"
     unit: ClassVar[str] = "N m"
 
-    torque: InTime = field(metadata=field_metadata("the torque in N m", _finite_or_profile))
+    torque: InTime = field(
+        metadata=field_metadata("the torque in N m, numbers or expressions of the time t", _finite_or_profile)
+    )
 
 
 Load = PointForce | AppliedTorque
