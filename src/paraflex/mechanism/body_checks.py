@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import TypeVar
 
-from paraflex.errors import InputError, suggestion, within
+from paraflex.errors import InputError, within
 from paraflex.fem import Polynomial, mesh_beam
 from paraflex.limits import ELEMENTS
 from paraflex.mechanism.bodies import AssumedModesBeam, Body, ComponentModes, FlexibleBeam, RigidBody
 from paraflex.mechanism.damping import Damping, stiffness_damping
 from paraflex.mechanism.modal import ModalBody
-from paraflex.mechanism.quantities import check_numbers, finite
+from paraflex.mechanism.quantities import check_numbers, finite, known
 
 T = TypeVar("T")
 
@@ -95,13 +95,7 @@ def _check_bar(body: FlexibleBeam | AssumedModesBeam, field: str) -> None:
     with within(field):
         mesh_beam(body.length, body.points, body.counts if isinstance(body, FlexibleBeam) else 1)
     for lump in body.lumps:
-        if lump.point not in body.points:
-            raise InputError(
-                "a lumped mass at an unknown point",
-                field=f"{field}.lumps",
-                value=lump.point,
-                remedy=suggestion(lump.point, body.points),
-            )
+        known(lump.point, body.points, f"{field}.lumps", "point", "a lumped mass at an unknown point")
         check_numbers(lump, f"{field}.lumps.{lump.point}")
 
 

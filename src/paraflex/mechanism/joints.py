@@ -13,7 +13,7 @@ from enum import Enum
 from typing import Any, ClassVar
 
 from paraflex.arguments import CheckedFields, checked_arguments, named_in_errors
-from paraflex.errors import InputError
+from paraflex.errors import InputError, within
 from paraflex.mechanism.profiles import TimeProfile, check_motion
 from paraflex.mechanism.quantities import AT_JOINT, JointThat, field_metadata, finite, optional, positive
 
@@ -269,10 +269,8 @@ class PrescribedAngle(CheckedFields):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        try:
+        with within(f"prescribed.{self.name}"):
             check_motion(self.profile)
-        except InputError as error:
-            raise error.within(f"prescribed.{self.name}") from None
 
 
 @dataclass(frozen=True)

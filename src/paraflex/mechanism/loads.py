@@ -9,7 +9,7 @@ import numpy as np
 
 from paraflex.arguments import CheckedFields, named_in_errors
 from paraflex.arrays import Array
-from paraflex.errors import InputError
+from paraflex.errors import within
 from paraflex.mechanism.joints import PointRef
 from paraflex.mechanism.profiles import TimeProfile, marks
 from paraflex.mechanism.quantities import AT_JOINT, field_metadata, finite, not_negative, optional, positive
@@ -149,12 +149,10 @@ class _Load(CheckedFields):
         InputError
             A profile does not cover a time or is not finite there.
         """
-        try:
+        with within(f"load.{self.name}"):
             each = [
                 one.evaluate(t)[0] if isinstance(one, TimeProfile) else np.full(t.shape, one) for one in self.components
             ]
-        except InputError as error:
-            raise error.within(f"load.{self.name}") from None
         return np.stack(each, axis=1)
 
     def largest(self, t: Array) -> float:

@@ -169,15 +169,16 @@ class Members(CheckedFields):
 
     def joint(self, name: str) -> Joint:
         """Return the joint of a name; raise an `InputError` if there is none."""
-        known(name, self._joints_by_name, "joint", "joint")
-        return self._joints_by_name[name]
+        known(name, self.joints_by_name, "joint", "joint")
+        return self.joints_by_name[name]
 
     @cached_property
     def _bodies_by_name(self) -> dict[str, Body]:
         return {body.name: body for body in self.bodies}
 
     @cached_property
-    def _joints_by_name(self) -> dict[str, Joint]:
+    def joints_by_name(self) -> dict[str, Joint]:
+        """Joints by name."""
         return {joint.name: joint for joint in self.joints}
 
     @property

@@ -15,10 +15,10 @@ from paraflex.limits import of_size, possible
 JointThat = Literal["moves", "turns", "slides", "exists"]
 
 
-def known(name: str, names: Collection[str], field: str, kind: str) -> None:
-    """Raise an `InputError` that suggests the nearest name, unless a name is known."""
+def known(name: str, names: Collection[str], field: str, kind: str, problem: str = "") -> None:
+    """Raise an `InputError` that suggests the nearest name, unless a name is known; by default "unknown `kind`"."""
     if not isinstance(name, str) or name not in names:
-        raise InputError(f"unknown {kind}", field=field, value=name, remedy=suggestion(name, names))
+        raise InputError(problem or f"unknown {kind}", field=field, value=name, remedy=suggestion(name, names))
 
 
 def all_known(given: Iterable[str], names: Collection[str], field: str, kind: str) -> None:
