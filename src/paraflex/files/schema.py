@@ -35,6 +35,7 @@ from paraflex.control.shaping.shapers import Shaper
 from paraflex.equilibria.conditions import StaticsDefaults
 from paraflex.files.expressions import CONSTANTS, ExpressionError, check_in_time, evaluate
 from paraflex.files.study import StudyDefaults
+from paraflex.kinematics import Circle, Line, Path, PointPath, Polygon, SequencePath, TabulatedPath
 from paraflex.limits import LARGEST, TEXT_LETTERS, WHOLE
 from paraflex.mechanism import (
     JOINT_KINDS,
@@ -451,7 +452,7 @@ class StartTable(_Table):
     rates: dict[str, RatesTable] = _optional("rates of x, y, phi and flexible of bodies", {})
 
 
-class EndEffectorTable(_table_of(EndEffector)):
+class EndEffectorTable(_table_of(EndEffector, coordinates=list[Text])):
     """The end-effector, a point that follows a path."""
 
 
@@ -476,15 +477,6 @@ class _PathTable(_Table):
     shaper: ShaperTable | None = _optional("the input shaper of the path: none by default")
 
 
-class PolygonTable(_PathTable):
-    """Straight segments from corner to corner."""
-
-    type: Literal["polygon"]
-    corners: list[Pair] = Field(description="a list of [x, y] in m")
-    max_acceleration: Number = Field(description="the largest acceleration in m/s^2")
-    closed: Yes = _optional("whether the path returns to its start", True)
-
-
 class LineTable(_PathTable):
     """A straight line."""
 
@@ -494,49 +486,36 @@ class LineTable(_PathTable):
     max_acceleration: Number = Field(description="the largest acceleration in m/s^2")
 
 
-class CircleTable(_PathTable):
-    """A circle or arc."""
-
-    type: Literal["circle"]
-    centre: Pair = Field(description="[x, y] in m")
-    radius: Number = Field(description="the radius in m")
-    max_acceleration: Number = Field(description="the largest acceleration along the path in m/s^2")
-    start_angle: Number = _optional("the angle of the first point in rad", 0.0)
-    sweep: Number = _optional("the angle swept in rad, positive counter-clockwise", 6.283185307179586)
+# Path classes by the name of their type in files.
+PATHS: dict[str, Any] = {
+    "polygon": Polygon, "line": Line, "circle": Circle, "points": PointPath, "table": TabulatedPath,
+    "sequence": SequencePath,
+}  # fmt: skip
 
 
-class PointsTable(_PathTable):
-    """A smooth motion through points."""
-
-    type: Literal["points"]
-    points: list[Annotated[list[Number], Field(min_length=2, max_length=3)]] = Field(
-        description="a list of [x, y] in m, or of [x, y, angle] in m and rad"
-    )
-    motion_time: Number = Field(description="the time from the first point to the last in s")
-
-
-class TabulatedPathTable(_PathTable):
+class TabulatedPathTable(_table_of(TabulatedPath, PATHS, _PathTable, without=("points", "times"))):
     """A smooth curve through many points, such as points read from a file."""
 
-    type: Literal["table"]
     table: PathRows = Field(
         description="a list of [x, y] in m, or of [x, y, t] in m and s, or the name of a file with such columns"
     )
-    motion_time: Number | None = _optional("the time from the first point to the last in s")
-    max_acceleration: Number | None = _optional("the largest acceleration along the path in m/s^2")
-    max_speed: Number | None = _optional("the largest speed along the path in m/s")
 
 
-class SequenceTable(_PathTable):
+_WRITTEN[Path] = Text
+
+
+class SequenceTable(_table_of(SequencePath, PATHS, _PathTable)):
     """Several paths, one after the other, in one motion."""
 
-    type: Literal["sequence"]
-    paths: list[Text] = Field(description="names of other [path.NAME] tables, in order")
-    dwell: Number = _optional("the dwell between two paths in s", 0.0)
 
-
+_NEAR = list[Annotated[list[Number], Field(min_length=2, max_length=3)]]
 PathTable = Annotated[
-    PolygonTable | LineTable | CircleTable | PointsTable | TabulatedPathTable | SequenceTable,
+    _table_of(Polygon, PATHS, _PathTable)
+    | LineTable
+    | _table_of(Circle, PATHS, _PathTable)
+    | _table_of(PointPath, PATHS, _PathTable, points=_NEAR)
+    | TabulatedPathTable
+    | SequenceTable,
     Field(discriminator="type"),
 ]
 

@@ -13,8 +13,8 @@ from paraflex.control.shaping.shapers import Shaper
 from paraflex.errors import InputError, within
 from paraflex.files.controllers import controller_table
 from paraflex.files.field_values import changed_fields, inexpressible
-from paraflex.files.mechanism import PATHS
 from paraflex.files.profiles import components_table, profile_parameters, profile_table
+from paraflex.files.schema import PATHS
 from paraflex.files.study import StudyDefaults
 from paraflex.kinematics import Path, SequencePath, TabulatedPath
 from paraflex.mechanism import (

@@ -86,12 +86,12 @@ def optional(default: Any, description: str, check: Callable[..., None] | None =
 AT_JOINT = field_metadata("the name of a joint", joint="moves")
 
 
-def check_numbers(member: Any, place: str) -> None:
-    """Check the numbers of a member by the metadata of their fields."""
+def check_numbers(member: Any, place: str = "") -> None:
+    """Check the numbers of a member at a place of a file by the metadata of their fields."""
     for each in fields(member):
         check, value = each.metadata.get("check"), getattr(member, each.name)
         if check is not None and value is not None:
-            check(value, f"{place}.{each.name}")
+            check(value, f"{place}.{each.name}".lstrip("."))
 
 
 def joints_named(member: Any) -> Iterator[tuple[str, str, JointThat]]:
