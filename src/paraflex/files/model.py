@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path as FilePath
 from typing import Any
@@ -418,7 +418,7 @@ def _model(table: ModelTable, data: dict[str, Any], source: str, text: str) -> M
     torques = read_torques(table)
     with within("study"):
         shaper = None if table.study.shaper is None else read_shaper(table.study.shaper)
-    study = StudyDefaults(**dict(table.study) | {"torques": torques, "shaper": shaper})
+    study = StudyDefaults(**_with_tuples(table.study) | {"torques": torques, "shaper": shaper})
     check_study(mechanism, paths, study)
     turns = mechanism.end_effector is not None and "angle" in mechanism.end_effector.coordinates
     if "orientation" in table.study.model_fields_set and not turns:
@@ -437,8 +437,13 @@ def _model(table: ModelTable, data: dict[str, Any], source: str, text: str) -> M
     return model
 
 
+def _with_tuples(table: Iterable[tuple[str, Any]]) -> dict[str, Any]:
+    """Return the fields of a table with tuples in place of lists."""
+    return {name: tuple(value) if isinstance(value, list) else value for name, value in table}
+
+
 def _statics(table: ModelTable, mechanism: Mechanism) -> StaticsDefaults:
-    found = StaticsDefaults(**dict(table.statics))
+    found = StaticsDefaults(**_with_tuples(table.statics))
     with within("statics"):
         conditions(mechanism, found)
     return found

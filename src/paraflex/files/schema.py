@@ -16,7 +16,6 @@ from types import NoneType, UnionType
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Union, get_args, get_origin, get_type_hints
 
 from pydantic import (
-    AfterValidator,
     BaseModel,
     BeforeValidator,
     ConfigDict,
@@ -177,10 +176,7 @@ def _in_time(hint: Any, name: str, description: str) -> dict[str, Any]:
     pieces: Any = Annotated[list[piece], Field(min_length=1)]
     example = f"a list of {{ until = s, {name} = ... }}, the last without until"
     return {
-        name: (
-            written | None,
-            _optional(description),
-        ),
+        name: (written | None, _optional(description)),
         "pieces": (pieces | None, _optional(example)),
         "table": (rows | None, _optional(f"a list of {columns} such columns")),
         "interpolation": (InterpolationName | None, _INTERPOLATION),
@@ -230,8 +226,7 @@ def _written(hint: Any) -> Any:
         return dict[Text, _written(inner[1])]
     if origin is tuple and inner[1:] != (...,):
         return tuple[*map(_written, inner)]
-    many = list[_written(inner[0])]
-    return Annotated[many, AfterValidator(tuple)] if origin is tuple else many
+    return list[_written(inner[0])]
 
 
 def _fields_of(
@@ -265,8 +260,9 @@ def _fields_of(
             default = (... if needed else None) if default is MISSING else getattr(default, "value", default)
             if each.name in written and NoneType in get_args(kind):
                 default = None
-            found[each.name] = (kind, Field({} if default == () and get_origin(kind) is dict else default,
-                                            description=description))  # fmt: skip
+            elif default == ():
+                default = {} if get_origin(kind) is dict else []
+            found[each.name] = (kind, Field(default, description=description))
     return found
 
 
@@ -452,7 +448,7 @@ class StartTable(_Table):
     rates: dict[str, RatesTable] = _optional("rates of x, y, phi and flexible of bodies", {})
 
 
-class EndEffectorTable(_table_of(EndEffector, coordinates=list[Text])):
+class EndEffectorTable(_table_of(EndEffector)):
     """The end-effector, a point that follows a path."""
 
 
