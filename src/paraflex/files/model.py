@@ -214,15 +214,13 @@ class Model(CheckedFields):
         self.check_start()
         followed = path if isinstance(path, Path) else self.path(path)
         study = self.study.filled(samples=samples, assembly=assembly, orientation=orientation, after=after)
+        chosen = {name: getattr(study, name) for name in ("samples", "assembly", "orientation", "after")}
         task = plan_tracking(
             self.mechanism if mechanism is None else mechanism,
             followed,
             duration=self.duration(followed, duration),
-            samples=study.samples,
-            assembly=study.assembly,
-            orientation=study.orientation,
-            after=study.after,
             warning=warning,
+            **chosen,
         )
         return task if study.shaper is None else shape_torques(task, study.shaper)
 
@@ -373,7 +371,7 @@ def model_from(data: dict[str, Any], source: str, text: str = "") -> Model:
 
 def _parsed(text: str, source: str, folder: FilePath, settings: Mapping[str, Any]) -> dict[str, Any]:
     with naming(source):
-        return with_rows(with_values(parse_toml(text, source), settings), folder, list(settings.values()))
+        return with_rows(with_values(parse_toml(text), settings), folder, list(settings.values()))
 
 
 def _read(name_or_file: str | FilePath) -> tuple[str, str, FilePath]:
@@ -392,7 +390,8 @@ def _read(name_or_file: str | FilePath) -> tuple[str, str, FilePath]:
                 value=text,
                 remedy=suggestion(text, [*library_names(), *generator_names()]),
             )
-    return read_text(path, source), source, path.parent
+    with naming(source):
+        return read_text(path), source, path.parent
 
 
 @checked_arguments()
@@ -406,10 +405,10 @@ def load_path(file: str | FilePath) -> Path:
     """
     source = str(file)
     with naming(source):
-        data = with_rows(read_toml(FilePath(file), source), FilePath(file).parent)
-    table = validate(PathFile, data, source)
-    with naming(source), within("path"):
-        return read_path(table.path)
+        data = with_rows(read_toml(FilePath(file)), FilePath(file).parent)
+        table = validate(PathFile, data, source)
+        with within("path"):
+            return read_path(table.path)
 
 
 def _model(table: ModelTable, data: dict[str, Any], source: str, text: str) -> Model:

@@ -9,7 +9,7 @@ from paraflex.errors import InputError, within
 from paraflex.fem import Polynomial, mesh_beam
 from paraflex.limits import ELEMENTS
 from paraflex.mechanism.bodies import AssumedModesBeam, Body, ComponentModes, FlexibleBeam, RigidBody
-from paraflex.mechanism.damping import Damping, stiffness_damping
+from paraflex.mechanism.damping import stiffness_damping
 from paraflex.mechanism.modal import ModalBody
 from paraflex.mechanism.quantities import check_numbers, finite, known
 
@@ -45,7 +45,8 @@ def check_body(body: Body) -> None:
         with within(field):
             n = body.mesh.n_flexible
         _check_frames(body, field)
-    check_damping(body.damping, f"{field}.damping")
+    if body.damping is not None:
+        check_numbers(body.damping, f"{field}.damping")
     static = isinstance(body, FlexibleBeam) and body.reduction is ComponentModes.CRAIG_BAMPTON
     if static and body.modes is None:
         raise InputError(
@@ -74,16 +75,6 @@ def _check_frames(beam: FlexibleBeam, field: str) -> None:
             remedy="leave modes out, or frames",
         )  # fmt: skip
     stiffness_damping(beam.damping, "a beam in several frames", f"{field}.damping")
-
-
-def check_damping(damping: Damping | None, field: str) -> None:
-    """Check that damping is of a known kind and that its coefficients are valid, above all not negative."""
-    if damping is not None and not isinstance(damping, Damping):
-        raise InputError(
-            "not a damping", field=field, value=damping, remedy="give RayleighDamping or ModalDamping, or leave it out"
-        )
-    if damping is not None:
-        check_numbers(damping, field)
 
 
 def _check_bar(body: FlexibleBeam | AssumedModesBeam, field: str) -> None:
