@@ -159,12 +159,9 @@ def _followed(data: Mapping[str, Any], parts: Sequence[str]) -> Place:
     inside: Any = data
     for part in parts:
         key: str | int = int(part) if isinstance(inside, list) and part.isdigit() else part
-        if not (
-            (isinstance(inside, dict) and key in inside)
-            or (isinstance(inside, list) and isinstance(key, int) and key < len(inside))
-        ):
+        inside = value_at(inside, (key,))
+        if inside is None:
             break
-        inside = inside[key]  # pyright: ignore[reportArgumentType, reportCallIssue]
         place.append(key)
     return tuple(place)
 
