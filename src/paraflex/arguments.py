@@ -194,7 +194,8 @@ def _take_as(hint: Any, _spelling: str) -> Take | None:
     if origin in _TABLES or hint is dict:
         return _as_table(hint, inner)
     if origin is abc.Callable:
-        return _plain_of(callable, _noun(hint), f"give {_expected(hint)}")
+        noun, expected = _words(hint)
+        return _plain_of(callable, noun, f"give {expected}")
     return _as_instance(hint) if isinstance(hint, type) and origin is None else None
 
 
@@ -263,7 +264,7 @@ def _as_instance(kind: type) -> Take | None:
         converted = None if make is None else make(value, field)
         if converted is not None:
             return converted
-        raise refused(value, field, _noun(kind), f"give {_expected(kind)}")
+        raise _refused(value, field, kind)
 
     return take
 
@@ -294,7 +295,7 @@ def _as_one_of(hint: Any, kinds: Sequence[Any]) -> Take | None:
                 return each(value, field)  # type: ignore[misc]
             except InputError:
                 continue
-        raise refused(value, field, _noun(hint), f"give {_expected(hint)}")
+        raise _refused(value, field, hint)
 
     return take
 
@@ -305,7 +306,7 @@ def _as_row(hint: Any, kinds: Sequence[Any]) -> Take:
 
     def take(value: Any, field: str) -> Any:
         if isinstance(value, str | Mapping) or not isinstance(value, Iterable) or _length(value) != len(takes):
-            raise refused(value, field, _noun(hint), f"give {_expected(hint)}")
+            raise _refused(value, field, hint)
         return _same(value, tuple(each(one, field) if each else one for each, one in zip(takes, value, strict=True)))
 
     return take
@@ -347,7 +348,7 @@ def _as_many(hint: Any, kind: Any, collect: Callable[[Iterable[Any]], Any]) -> T
         alone = (is_dataclass(value) and not isinstance(value, Sequence)) or getattr(value, "ndim", 1) == 0
         if isinstance(value, str | Mapping) or alone or not isinstance(value, Iterable):
             if value is None or one is None:
-                raise refused(value, field, _noun(hint), f"give {_expected(hint)}")
+                raise _refused(value, field, hint)
             return collect([one(value, field)])
         if one is None or (numbers and kind is float and getattr(value, "ndim", 1) == 1):
             return value
@@ -366,17 +367,13 @@ def _as_table(hint: Any, kinds: Sequence[Any]) -> Take:
 
     def take(value: Any, field: str) -> Any:
         if not isinstance(value, Mapping):
-            raise refused(value, field, _noun(hint), f"give {_expected(hint)}")
+            raise _refused(value, field, hint)
         if key is None and item is None:
             return value
-        names, items = list(value.keys()), list(value.values())
-        converted_names = [key(name, field) for name in names] if key else names
-        converted = [item(each, f"{field}.{name}") for name, each in zip(names, items, strict=True)] if item else items
-        return (
-            value
-            if _same(names, converted_names) is names and _same(items, converted) is items
-            else dict(zip(converted_names, converted, strict=True))
-        )
+        names = [key(name, field) for name in value] if key else [*value]
+        items = [item(each, f"{field}.{name}") for name, each in value.items()] if item else [*value.values()]
+        unchanged = all(a is b for a, b in zip((*names, *items), (*value, *value.values()), strict=True))
+        return value if unchanged else dict(zip(names, items, strict=True))
 
     return take
 
@@ -410,43 +407,39 @@ def named_in_errors(noun: str, expected: str = "") -> Callable[[C], C]:
     return register
 
 
-def _noun(hint: Any) -> str:
-    """Return the noun of a type in error messages."""
+def _refused(value: object, field: object, hint: Any) -> InputError:
+    """Return the error for a value that is not of a type."""
+    noun, expected = _words(hint)
+    return refused(value, field, noun, f"give {expected}")
+
+
+def _words(hint: Any) -> tuple[str, str]:
+    """Return the noun of a type in error messages, and the description of the value to give instead."""
+    origin, inner = typing.get_origin(hint), typing.get_args(hint)
+    expected = ""
     if hint in _NOUNS:
-        return _NOUNS[hint]
-    if _stripped(hint) in _ERROR_NOUNS:
-        return _ERROR_NOUNS[_stripped(hint)][0]
-    origin, inner = typing.get_origin(hint), typing.get_args(hint)
-    if origin in _UNIONS:
-        return _either([_noun(kind) for kind in _members(inner)])
-    if _is_row(hint):
-        return f"{_NUMBER_WORDS.get(len(inner), str(len(inner)))} numbers" if set(inner) == {float} else "such a row"
-    if origin in _LISTS:
-        return "a list"
-    if origin in _TABLES or hint is dict:
-        return "a dictionary"
-    if origin is abc.Callable:
-        return "a function"
-    if issubclass(hint, PurePath):
-        return "a file name"
-    return f"{'an' if hint.__name__[0] in 'AEIOU' else 'a'} {hint.__name__}"
-
-
-def _expected(hint: Any) -> str:
-    """Return the description of the value to give instead."""
-    origin, inner = typing.get_origin(hint), typing.get_args(hint)
-    expected = _ERROR_NOUNS.get(_stripped(hint), ("", ""))[1]
-    if expected:
-        return expected
-    if origin in _UNIONS:
-        return _either([_expected(kind) for kind in _members(inner)])
-    if origin in _LISTS and not _is_row(hint):
-        return f"a list, each {_expected(inner[0])}"
-    if origin in _TABLES and inner and Any not in inner:
-        return f"a dictionary, {{{_noun(inner[0]).replace('a text', 'name')}: {_noun(inner[1])}}}"
-    if isinstance(hint, type) and issubclass(hint, Enum):
-        return "one of " + ", ".join(f'"{member.value}"' for member in hint)
-    return _noun(hint)
+        noun = _NOUNS[hint]
+    elif origin in _UNIONS:
+        noun, expected = map(_either, zip(*map(_words, _members(inner)), strict=True))
+    elif _is_row(hint):
+        noun = f"{_NUMBER_WORDS.get(len(inner), str(len(inner)))} numbers" if set(inner) == {float} else "such a row"
+    elif origin in _LISTS:
+        noun, expected = "a list", f"a list, each {_words(inner[0])[1]}"
+    elif origin in _TABLES or hint is dict:
+        noun = "a dictionary"
+        if inner and Any not in inner:
+            (key, _), (item, _) = map(_words, inner)
+            expected = f"a dictionary, {{{key.replace('a text', 'name')}: {item}}}"
+    elif origin is abc.Callable:
+        noun = "a function"
+    elif issubclass(hint, PurePath):
+        noun = "a file name"
+    else:
+        noun = f"{'an' if hint.__name__[0] in 'AEIOU' else 'a'} {hint.__name__}"
+        if issubclass(hint, Enum):
+            expected = "one of " + ", ".join(f'"{member.value}"' for member in hint)
+    named, instead = _ERROR_NOUNS.get(_stripped(hint), ("", ""))
+    return named or noun, instead or expected or named or noun
 
 
 def _stripped(hint: Any) -> Any:

@@ -124,6 +124,5 @@ def study_table(kind: type[T], file: str | Path) -> Iterator[tuple[T, Path]]:
         The file cannot be read, or a field does not fit.
     """
     source = str(file)
-    table = validate(kind, read_toml(Path(file), source), source)
     with naming(source):
-        yield table, Path(file).parent
+        yield validate(kind, read_toml(Path(file)), source), Path(file).parent

@@ -4,18 +4,17 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any, NamedTuple, Protocol
 
 from paraflex.errors import InputError, suggestion
 from paraflex.kinematics import ModelWithPaths
 from paraflex.mechanism import Mechanism, PointRef
-from paraflex.mechanism.quantities import known
+from paraflex.mechanism.quantities import known, optional
 
 _AXES = ("x", "y", "angle")
 # Fields of loads and displacements; choosing one of them replaces all.
 ACTIONS = ("loads", "torques", "moved")
-STEPS, FACTORS = 10, 1
 # Upper limit of steps; more would show no further detail.
 _MOST_STEPS = 10_000
 # Buckling modes above this number are of no use.
@@ -121,13 +120,21 @@ class StaticsDefaults:
         Number of buckling factors.
     """
 
-    loads: Mapping[str, float] = field(default_factory=dict)
-    torques: Mapping[str, float] = field(default_factory=dict)
-    moved: Mapping[str, float] = field(default_factory=dict)
-    held: tuple[str, ...] | None = None
-    steps: int = STEPS
-    stiffness: tuple[str, ...] | None = None
-    buckling: int = FACTORS
+    loads: Mapping[str, float] = optional(
+        {}, 'the force in N or torque in N m at each joint, "body.point.x", ".y" or ".angle"'
+    )
+    torques: Mapping[str, float] = optional({}, "the torque of each motor in N m")
+    moved: Mapping[str, float] = optional(
+        {}, 'the travel in m or rad of each joint, "body.point.x", ".y" or ".angle" from the start'
+    )
+    held: tuple[str, ...] | None = optional(
+        None, "coordinates held fixed; by default the joints of motors without a torque"
+    )
+    steps: int = optional(10, "the number of equal steps of loads and travels")
+    stiffness: tuple[str, ...] | None = optional(
+        None, "coordinates whose stiffness is computed; by default those loaded or moved"
+    )
+    buckling: int = optional(1, "the number of buckling factors about every equilibrium")
 
     def filled(self, **chosen: Any) -> StaticsDefaults:
         """Replace defaults by chosen values that are not None; see `chosen_over` for loads, torques, displacements."""

@@ -3,47 +3,30 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import fields
-from typing import Any
+from dataclasses import MISSING, fields
+from typing import Any, get_args
 
 from paraflex.errors import InputError
-from paraflex.fem import ReferenceCondition
 from paraflex.files.field_values import check_fields
-from paraflex.files.schema import (
-    AssumedModesTable,
-    BeamTable,
-    DampingTable,
-    ModalTable,
-    ModelTable,
-    RigidTable,
-    SectionTable,
-)
+from paraflex.files.schema import DampingTable, ModelTable, SectionTable
 from paraflex.limits import SHAPE_FUNCTIONS, at_most
 from paraflex.mechanism import (
-    AssumedModesBeam,
     Body,
-    ComponentModes,
-    Curvature,
     Damping,
-    FlexibleBeam,
-    LossFactor,
     LumpedMass,
     Material,
-    ModalBody,
-    ModalDamping,
     ModalPoint,
     Polynomial,
-    RayleighDamping,
-    RigidBody,
     Section,
     ShapeFunction,
     Sine,
 )
+from paraflex.mechanism.bodies import BODY_KINDS
 from paraflex.mechanism.quantities import known
 from paraflex.mechanism.sections import SHAPES
 
 
-def read_body(name: str, body: BeamTable | RigidTable | AssumedModesTable | ModalTable, table: ModelTable) -> Body:
+def read_body(name: str, body: Any, table: ModelTable) -> Body:
     """Build a body from its table.
 
     Parameters
@@ -58,44 +41,33 @@ def read_body(name: str, body: BeamTable | RigidTable | AssumedModesTable | Moda
     Raises
     ------
     InputError
-        Section, material or lump missing from the file, or invalid numbers.
+        Section, material or lump missing from the file, invalid numbers, or an inadmissible number of sines.
     """
-    if isinstance(body, RigidTable):
-        return RigidBody(name, **_given(body))
-    if isinstance(body, ModalTable):
-        points = {key: ModalPoint(**dict(point)) for key, point in body.points.items()}
-        return ModalBody(name, **_given(body) | {"points": points, "damping": _damping(body.damping, name)})
-    lumps = []
-    for point, lump_name in body.lumps.items():
-        lump = _named(table.lump, lump_name, f"body.{name}.lumps.{point}", "lump")
-        lumps.append(LumpedMass(point, **dict(lump)))
-    if isinstance(body, AssumedModesTable):
-        section, material = _section(name, body.section, table), _material(name, body.material, table)
-        return _assumed_modes_beam(name, body, section, material, tuple(lumps))
-    return FlexibleBeam(
-        name=name,
-        length=body.length,
-        section=_section(name, body.section, table)
-        if isinstance(body.section, str)
-        else tuple(_section(name, each, table) for each in body.section),
-        material=_material(name, body.material, table)
-        if isinstance(body.material, str)
-        else tuple(_material(name, each, table) for each in body.material),
-        points=body.points,
-        elements=tuple(body.elements) if isinstance(body.elements, list) else body.elements,
-        lumps=tuple(lumps),
-        reference=ReferenceCondition(body.reference or table.reference),
-        curvature=Curvature(body.curvature or table.curvature),
-        modes=body.modes,
-        damping=_damping(body.damping, name),
-        flexible=body.flexible,
-        frames=body.frames,
-        reduction=ComponentModes(body.reduction),
-    )
-
-
-def _section(body: str, name: str, table: ModelTable) -> Section:
-    return read_section(name, _named(table.section, name, f"body.{body}.section", "section"))
+    values, place = dict(body), f"body.{name}"
+    kind: Any = BODY_KINDS[values.pop("type")]
+    if "lumps" in values:
+        values["lumps"] = [
+            LumpedMass(point, **dict(_named(table.lump, lump, f"{place}.lumps.{point}", "lump")))
+            for point, lump in body.lumps.items()
+        ]
+    for field, tables, read in (("section", table.section, read_section), ("material", table.material, _material)):
+        if field in values:
+            names = values[field]
+            found = tuple(
+                read(each, _named(tables, each, f"{place}.{field}", field))
+                for each in ([names] if isinstance(names, str) else names)
+            )
+            values[field] = found[0] if isinstance(names, str) else found
+    for direction in ("transverse", "axial") if "axial_sines" in values else ():
+        sines, polynomials = values.pop(f"{direction}_sines"), values.pop(f"{direction}_polynomials")
+        values[direction] = _functions(sines, polynomials, f"{place}.{direction}_sines")
+    if body.type == "modal":
+        values["points"] = {key: ModalPoint(**dict(point)) for key, point in body.points.items()}
+    if body.type == "beam":
+        values |= {key: values[key] or getattr(table, key) for key in ("reference", "curvature")}
+    if "damping" in values:
+        values["damping"] = _damping(body.damping, name)
+    return kind(name, **values)
 
 
 def read_section(name: str, table: SectionTable) -> Section:
@@ -113,53 +85,21 @@ def read_section(name: str, table: SectionTable) -> Section:
     if kind is None and not given.keys() & {"area", "second_moment"}:
         kind = "rectangle"
     section_type: Any = Section if kind is None else SHAPES[kind]
-    own = {each.name: each for each in fields(section_type) if each.name != "shape"}
-    what, described = "section by its area" if kind is None else f"{kind} section", SectionTable.model_fields
-    check_fields(given, own, what, f"section.{name}", lambda each: f"{described[each.name].description}")
+    what = "section by its area" if kind is None else f"{kind} section"
+    check_fields(section_type, given, what, f"section.{name}", "shape")
     try:
         return Section(**given) if kind is None else Section.of(section_type(**given))
     except InputError as error:
         raise error.at(f"section.{name}.{error.field.rpartition('.')[2]}") from None
 
 
-def _material(body: str, name: str, table: ModelTable) -> Material:
-    material = _named(table.material, name, f"body.{body}.material", "material")
-    return Material(**dict(material))
+def _material(_: str, table: Any) -> Material:
+    return Material(**dict(table))
 
 
 def _named(tables: Mapping[str, Any], name: str, where: str, kind: str) -> Any:
     known(name, tables, where, kind)
     return tables[name]
-
-
-def _assumed_modes_beam(
-    name: str, table: AssumedModesTable, section: Section, material: Material, lumps: tuple[LumpedMass, ...]
-) -> AssumedModesBeam:
-    """Build a beam with assumed modes; the sine functions come first, then the polynomials.
-
-    Raises
-    ------
-    InputError
-        Negative number of sines, or more than the limit.
-    """
-    return AssumedModesBeam(
-        name=name,
-        length=table.length,
-        section=section,
-        material=material,
-        transverse=_functions(table.transverse_sines, table.transverse_polynomials, f"body.{name}.transverse_sines"),
-        axial=_functions(table.axial_sines, table.axial_polynomials, f"body.{name}.axial_sines"),
-        points=table.points,
-        lumps=lumps,
-        modes=table.modes,
-        damping=_damping(table.damping, name),
-        flexible=table.flexible,
-    )
-
-
-def _given(table: RigidTable | ModalTable) -> dict[str, Any]:
-    """Return the fields of a table without its type."""
-    return {key: value for key, value in table if key != "type"}
 
 
 def _damping(table: DampingTable | None, name: str) -> Damping | None:
@@ -172,16 +112,14 @@ def _damping(table: DampingTable | None, name: str) -> Damping | None:
     """
     if table is None:
         return None
-    given = table.model_fields_set
-    if given <= {"mass", "stiffness"}:
-        return RayleighDamping(table.mass, table.stiffness)
-    if given == {"ratios"}:
-        return ModalDamping(tuple(table.ratios))
-    if given == {"loss_factor", "frequency"}:
-        return LossFactor(table.loss_factor, table.frequency)
+    given = {key: getattr(table, key) for key in table.model_fields_set}
+    for kind in get_args(Damping):
+        own = {each.name: each.default for each in fields(kind)}
+        if given.keys() <= own.keys() and all(name in given for name, default in own.items() if default is MISSING):
+            return kind(**given)
     raise InputError(
         "a loss factor needs the frequency at which it holds"
-        if given < {"loss_factor", "frequency"}
+        if given.keys() < {"loss_factor", "frequency"}
         else "ratios, a loss factor and Rayleigh's coefficients exclude one another",
         field=f"body.{name}.damping",
         value=sorted(given),

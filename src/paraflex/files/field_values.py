@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import MISSING, Field, fields
+from collections.abc import Mapping
+from dataclasses import MISSING, fields
 from typing import Any
 
 from paraflex.errors import InputError
@@ -20,37 +20,34 @@ def changed_fields(given: Any, *left_out: str) -> dict[str, Any]:
     return out
 
 
-def check_fields(
-    given: Mapping[str, Any],
-    own: Mapping[str, Field[Any]],
-    what: str,
-    place: str,
-    described: Callable[[Field[Any]], str],
-) -> None:
-    """Check the fields of a table against those of its class.
+def check_fields(kind: type, given: Mapping[str, Any], what: str, place: str, *left_out: str) -> None:
+    """Check the fields of a table against those of its class, without those in `left_out`.
 
     Parameters
     ----------
+    kind : type
+        Class.
     given : mapping
         Fields of the table.
-    own : mapping of str to Field
-        Fields of the class.
     what, place : str
         Name of the object and place of the table, for errors.
-    described : callable
-        Function that returns the description of a field, for errors.
+    *left_out : str
+        Fields of the class that are not in the table.
 
     Raises
     ------
     InputError
         Field that the class does not have, or missing required field.
     """
+    own = {each.name: each for each in fields(kind) if each.name not in left_out}
     for key, value in given.items():
         if key not in own:
             raise InputError(f"a {what} has no {key}", field=f"{place}.{key}", value=value, remedy="leave it out")
     for key, each in own.items():
         if each.default is MISSING and key not in given:
-            raise InputError("is missing", field=f"{place}.{key}", remedy=f"give {described(each)}")
+            raise InputError(
+                "is missing", field=f"{place}.{key}", remedy=f"give {each.metadata.get('description', 'it')}"
+            )
 
 
 def inexpressible(field: str, value: object, remedy: str) -> InputError:

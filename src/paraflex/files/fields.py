@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import re
 import typing
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from functools import reduce
 from typing import Any, NamedTuple
 
 from pydantic import BaseModel
@@ -210,9 +211,8 @@ def _alternatives(units: str) -> tuple[str, ...]:
 
 def _row(data: Any, place: Place) -> Sequence[Any] | None:
     """Return the list that contains the number at a place; None if it is not in a list."""
-    for key in place[:-1]:
-        data = _below(data, key)
-    return data if isinstance(data, list) else None
+    row = value_at(data, place[:-1])
+    return row if isinstance(row, list) else None
 
 
 def _slides(data: Mapping[str, Any], place: Place) -> bool | None:
@@ -223,8 +223,7 @@ def _slides(data: Mapping[str, Any], place: Place) -> bool | None:
     if table == "statics" and owner in ("loads", "moved"):
         return _moves_straight(data, str(key))
     of_motor = table in ("study", "statics") and owner == "torques"
-    name = _below(_below(data, "motor"), key) if of_motor else _below(_below(_below(data, table), owner), "joint")
-    return _joint_slides(data, name)
+    return _joint_slides(data, value_at(data, ("motor", key) if of_motor else (table, owner, "joint")))
 
 
 def _ratio_units(data: Mapping[str, Any], place: Place) -> tuple[str, ...]:
@@ -232,7 +231,7 @@ def _ratio_units(data: Mapping[str, Any], place: Place) -> tuple[str, ...]:
 
     For a rack and pinion the ratio is the radius of the pinion.
     """
-    joints = _below(_below(_below(data, place[0]), place[1]), "joints")
+    joints = value_at(data, (*place[:2], "joints"))
     slide = [bool(_joint_slides(data, name)) for name in joints] if isinstance(joints, list) else []
     if slide == [False, True]:
         return ("m/rad", "m")
@@ -241,7 +240,7 @@ def _ratio_units(data: Mapping[str, Any], place: Place) -> tuple[str, ...]:
 
 def _joint_slides(data: Mapping[str, Any], name: Any) -> bool | None:
     """Check whether a joint slides; None if there is no joint of that name."""
-    joint = _below(_below(data, "joint"), name) if isinstance(name, str) else None
+    joint = value_at(data, ("joint", name)) if isinstance(name, str) else None
     if joint is None:
         return None
     kind = JOINT_KINDS.get(str(_below(joint, "type")))
@@ -262,6 +261,11 @@ def is_table(annotation: Any) -> bool:
 def has_tables(annotation: Any) -> bool:
     """Check whether an annotation contains tables with fields of their own."""
     return is_table(annotation) or any(map(has_tables, typing.get_args(annotation)))
+
+
+def value_at(data: Any, place: Iterable[Any]) -> Any:
+    """Return the value at a place of data; None if there is none."""
+    return reduce(_below, place, data)
 
 
 def _below(data: Any, key: Any) -> Any:

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import fields
+from collections.abc import Mapping
 from typing import Any, cast
 
 from paraflex.control.shaping.shaped import ShapedPath
@@ -14,6 +13,7 @@ from paraflex.files.expressions import evaluate_parameters
 from paraflex.files.field_values import check_fields
 from paraflex.files.profiles import quantities, read_components, read_profile
 from paraflex.files.schema import (
+    PATHS,
     JointTable,
     ModelTable,
     PathTable,
@@ -23,20 +23,17 @@ from paraflex.files.schema import (
     TabulatedPathTable,
     TorqueTable,
 )
-from paraflex.kinematics import Circle, Line, Path, PointPath, Polygon, SequencePath, TabulatedPath
+from paraflex.kinematics import Path
 from paraflex.mechanism import (
     JOINT_KINDS,
     ActuationMode,
-    AppliedTorque,
     Assembly,
     EndEffector,
     Group,
     Joint,
-    Load,
     Mechanism,
     Motor,
     Payload,
-    PointForce,
     PointRef,
     PrescribedAngle,
     RevoluteJoint,
@@ -44,16 +41,6 @@ from paraflex.mechanism import (
 )
 from paraflex.mechanism.loads import InTime
 from paraflex.mechanism.quantities import known
-
-# Path classes by the name of their type in files.
-PATHS: dict[str, Callable[..., Path]] = {
-    "polygon": Polygon,
-    "line": Line,
-    "circle": Circle,
-    "points": PointPath,
-    "table": TabulatedPath,
-    "sequence": SequencePath,
-}
 
 
 def read_mechanism(table: ModelTable) -> Mechanism:
@@ -72,8 +59,7 @@ def read_mechanism(table: ModelTable) -> Mechanism:
     }
     for field, group in groups_of(Mechanism).items():
         if group.kinds:
-            make = _load if group.table == "load" else _member
-            members[field] = [make(group, name, one, table) for name, one in getattr(table, group.table).items()]
+            members[field] = [_member(group, name, one, table) for name, one in getattr(table, group.table).items()]
     mechanism = Mechanism(
         **members,
         bodies=tuple(read_body(name, body, table) for name, body in table.body.items()),
@@ -95,10 +81,7 @@ def _joint(name: str, entry: list[str] | JointTable) -> Joint:
     # Fields of another kind of joint are rejected, because they would have no effect.
     kind = JOINT_KINDS[entry.type]
     given = {key: getattr(entry, key) for key in entry.model_fields_set - {"type", "points"}}
-    own = {each.name: each for each in fields(kind)[3:]}
-    check_fields(
-        given, own, f"{entry.type} joint", f"joint.{name}", lambda each: each.metadata.get("description", "it")
-    )
+    check_fields(kind, given, f"{entry.type} joint", f"joint.{name}", "name", "a", "b")
     return kind(name, a, b, **given)
 
 
@@ -124,14 +107,6 @@ def _check_quantity(name: str, entry: PrescribedTable, joint: list[str] | JointT
         )  # fmt: skip
 
 
-def _load(_: Group, name: str, entry: Any, table: ModelTable) -> Load:
-    """Build a load from its table."""
-    kind = {"force": PointForce, "torque": AppliedTorque}[entry.type]
-    with within(f"load.{name}"):
-        given = read_components(entry, entry.type, evaluate_parameters(table.parameters), table.study.duration)
-    return kind(name, entry.point, *(given if entry.type == "torque" else (given,)))
-
-
 def read_torques(table: ModelTable) -> dict[str, InTime]:
     """Read the motor torques given in the study.
 
@@ -152,11 +127,15 @@ def read_torques(table: ModelTable) -> dict[str, InTime]:
     return torques
 
 
-def _member(group: Group, name: str, entry: Any, _: ModelTable) -> Any:
+def _member(group: Group, name: str, entry: Any, table: ModelTable) -> Any:
     """Build a member of a group from its table."""
     values = dict(entry)
     kinds = {getattr(kind, "kind", None): kind for kind in group.kinds}
     kind = kinds[values.pop("type")] if "type" in values else group.kinds[0]
+    if group.table == "load":
+        with within(f"load.{name}"):
+            given = read_components(entry, entry.type, evaluate_parameters(table.parameters), table.study.duration)
+        return kind(name, entry.point, given[0] if entry.type == "torque" else given)
     points = [PointRef.parse(point, f"{group.table}.{name}.points") for point in values.pop("points", ())]
     return kind(name, *points, *values.pop("joints", ()), **values)
 

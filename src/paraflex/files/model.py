@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path as FilePath
 from typing import Any
@@ -214,15 +214,13 @@ class Model(CheckedFields):
         self.check_start()
         followed = path if isinstance(path, Path) else self.path(path)
         study = self.study.filled(samples=samples, assembly=assembly, orientation=orientation, after=after)
+        chosen = {name: getattr(study, name) for name in ("samples", "assembly", "orientation", "after")}
         task = plan_tracking(
             self.mechanism if mechanism is None else mechanism,
             followed,
             duration=self.duration(followed, duration),
-            samples=study.samples,
-            assembly=study.assembly,
-            orientation=study.orientation,
-            after=study.after,
             warning=warning,
+            **chosen,
         )
         return task if study.shaper is None else shape_torques(task, study.shaper)
 
@@ -373,7 +371,7 @@ def model_from(data: dict[str, Any], source: str, text: str = "") -> Model:
 
 def _parsed(text: str, source: str, folder: FilePath, settings: Mapping[str, Any]) -> dict[str, Any]:
     with naming(source):
-        return with_rows(with_values(parse_toml(text, source), settings), folder, list(settings.values()))
+        return with_rows(with_values(parse_toml(text), settings), folder, list(settings.values()))
 
 
 def _read(name_or_file: str | FilePath) -> tuple[str, str, FilePath]:
@@ -392,7 +390,8 @@ def _read(name_or_file: str | FilePath) -> tuple[str, str, FilePath]:
                 value=text,
                 remedy=suggestion(text, [*library_names(), *generator_names()]),
             )
-    return read_text(path, source), source, path.parent
+    with naming(source):
+        return read_text(path), source, path.parent
 
 
 @checked_arguments()
@@ -406,28 +405,22 @@ def load_path(file: str | FilePath) -> Path:
     """
     source = str(file)
     with naming(source):
-        data = with_rows(read_toml(FilePath(file), source), FilePath(file).parent)
-    table = validate(PathFile, data, source)
-    with naming(source), within("path"):
-        return read_path(table.path)
+        data = with_rows(read_toml(FilePath(file)), FilePath(file).parent)
+        table = validate(PathFile, data, source)
+        with within("path"):
+            return read_path(table.path)
 
 
 def _model(table: ModelTable, data: dict[str, Any], source: str, text: str) -> Model:
     mechanism = read_mechanism(table)
     paths = read_paths(table.path)
-    values = dict(table.study) | {
-        "paths": tuple(table.study.paths),
-        "modes": tuple(table.study.modes),
-        "orientation": table.study.orientation or 0.0,
-        "torques": read_torques(table),
-        "controllers": tuple(table.study.controllers),
-    }
+    torques = read_torques(table)
     with within("study"):
-        values["shaper"] = None if table.study.shaper is None else read_shaper(table.study.shaper)
-    study = StudyDefaults(**values)
+        shaper = None if table.study.shaper is None else read_shaper(table.study.shaper)
+    study = StudyDefaults(**_with_tuples(table.study) | {"torques": torques, "shaper": shaper})
     check_study(mechanism, paths, study)
     turns = mechanism.end_effector is not None and "angle" in mechanism.end_effector.coordinates
-    if table.study.orientation is not None and not turns:
+    if "orientation" in table.study.model_fields_set and not turns:
         raise InputError(
             "the angle is not a task coordinate", field="study.orientation", value=table.study.orientation,
             remedy='name "angle" among the coordinates of [end_effector], or leave it out',
@@ -443,11 +436,13 @@ def _model(table: ModelTable, data: dict[str, Any], source: str, text: str) -> M
     return model
 
 
+def _with_tuples(table: Iterable[tuple[str, Any]]) -> dict[str, Any]:
+    """Return the fields of a table with tuples in place of lists."""
+    return {name: tuple(value) if isinstance(value, list) else value for name, value in table}
+
+
 def _statics(table: ModelTable, mechanism: Mechanism) -> StaticsDefaults:
-    values = dict(table.statics)
-    for name in ("held", "stiffness"):
-        values[name] = None if values[name] is None else tuple(values[name])
-    found = StaticsDefaults(**values)
+    found = StaticsDefaults(**_with_tuples(table.statics))
     with within("statics"):
         conditions(mechanism, found)
     return found

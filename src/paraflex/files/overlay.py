@@ -9,7 +9,7 @@ from typing import Any
 
 from paraflex.errors import InputError, suggestion
 from paraflex.files.expressions import ExpressionError, evaluate, evaluate_parameters
-from paraflex.files.fields import Place, field_at, has_tables, is_table, leaves, takes_number
+from paraflex.files.fields import Place, field_at, has_tables, is_table, leaves, takes_number, value_at
 from paraflex.files.schema import ModelTable
 
 _BARE = re.compile(r"[A-Za-z0-9_-]+\Z")
@@ -39,7 +39,7 @@ def find_place(data: Mapping[str, Any], field: str) -> Place:
             "no such number in the mechanism's file", field=field,
             remedy=suggestion(field, [_spelt(each) for each in number_places(data)]),
         )  # fmt: skip
-    found = _at(data, place)
+    found = value_at(data, place)
     if not _is_number(found, data):
         raise InputError("not a number in the mechanism's file", field=field, value=found, remedy=_below(data, field))
     return place
@@ -87,13 +87,13 @@ def _place_to_set(data: Mapping[str, Any], field: str) -> Place:
     parts = _in_full(data, field)
     place = _followed(data, parts)
     for part in parts[len(place) :]:
-        if isinstance(_at(data, place), list) or not _may_have(data, place, part):
+        if isinstance(value_at(data, place), list) or not _may_have(data, place, part):
             raise InputError(
                 "no such field in the model's file", field=field,
                 remedy=_same_names(data, part) or suggestion(_spelt((*place, part)), _known_below(data, place)),
             )  # fmt: skip
         place = (*place, part)
-    if isinstance(_at(data, place), dict):
+    if isinstance(value_at(data, place), dict):
         raise InputError("a table of the model's file", field=field, remedy=_below(data, field))
     return place
 
@@ -110,7 +110,7 @@ def _known_below(data: Mapping[str, Any], place: Place) -> list[str]:
     """Return the fields that the table at a place has or may have; all numbers of the data for an empty place."""
     if not place:
         return [_spelt(each) for each in number_places(data)]
-    annotation, inside = field_at(ModelTable, data, place).annotation, _at(data, place)
+    annotation, inside = field_at(ModelTable, data, place).annotation, value_at(data, place)
     there = list(inside) if isinstance(inside, dict) else range(len(inside)) if isinstance(inside, list) else []
     possible = list(annotation.model_fields) if is_table(annotation) else []
     return [_spelt((*place, key)) for key in dict.fromkeys([*there, *possible])]
@@ -146,7 +146,7 @@ def _joined(data: Mapping[str, Any], parts: list[str]) -> list[str]:
         place = _followed(data, parts[:start])
         if len(place) < start:
             break
-        inside = _at(data, place)
+        inside = value_at(data, place)
         for end in range(len(parts), start + 1, -1) if isinstance(inside, dict) else ():
             if (key := ".".join(parts[start:end])) in inside:
                 return [*parts[:start], key, *parts[end:]]
@@ -159,22 +159,11 @@ def _followed(data: Mapping[str, Any], parts: Sequence[str]) -> Place:
     inside: Any = data
     for part in parts:
         key: str | int = int(part) if isinstance(inside, list) and part.isdigit() else part
-        if not (
-            (isinstance(inside, dict) and key in inside)
-            or (isinstance(inside, list) and isinstance(key, int) and key < len(inside))
-        ):
+        inside = value_at(inside, (key,))
+        if inside is None:
             break
-        inside = inside[key]  # pyright: ignore[reportArgumentType, reportCallIssue]
         place.append(key)
     return tuple(place)
-
-
-def _at(data: Any, place: Place) -> Any:
-    for key in place:
-        if isinstance(data, dict) and key not in data:
-            return None
-        data = data[key]
-    return data
 
 
 def number_places(data: Mapping[str, Any]) -> Iterator[Place]:
@@ -184,7 +173,7 @@ def number_places(data: Mapping[str, Any]) -> Iterator[Place]:
 
 def number_at(data: Mapping[str, Any], place: Place) -> float:
     """Return the number at a place found by `find_place`, or the value of its expression."""
-    inside = _at(data, place)
+    inside = value_at(data, place)
     if isinstance(inside, str):
         return float(evaluate(inside, evaluate_parameters(data.get("parameters", {}))))
     return float(inside)

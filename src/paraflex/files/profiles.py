@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -18,7 +18,7 @@ from paraflex.files.expressions import (
     is_constant,
     names_in,
 )
-from paraflex.files.schema import PieceTable, PrescribedTable
+from paraflex.files.schema import PrescribedTable
 from paraflex.mechanism import ConstantSpeed, PiecewiseProfile, TabulatedProfile, TimeProfile
 from paraflex.mechanism.loads import InTime
 from paraflex.mechanism.profiles import Interpolation, Values
@@ -91,19 +91,21 @@ def read_profile(entry: PrescribedTable, parameters: Mapping[str, float], durati
         Profile given in two ways, speed together with anything but a number, pieces that do not connect, expression
         without finite derivatives, or table that is invalid or does not cover the study.
     """
-    given = [name for name in ("angle", "displacement", "pieces", "table") if getattr(entry, name) is not None]
+    given = [*_quantities(entry), *(name for name in ("pieces", "table") if getattr(entry, name) is not None)]
     if len(given) > 1:
         raise InputError(
             "a profile is given in two ways", field=given[-1], value=", ".join(given), remedy=f"drop all but {given[0]}"
         )
-    profile = _profile(entry, parameters)
-    if entry.speed is not None and not isinstance(profile, ConstantSpeed):
-        raise InputError(
-            "a speed can only be added to an angle or displacement that is a number",
-            field="speed",
-            value=entry.speed,
-            remedy="write it into the profile",
-        )
+    profile = _profiles(entry, parameters)[0] if given else ConstantSpeed(0.0, 0.0, from_assembly=True)
+    if entry.speed is not None:
+        if not isinstance(profile, ConstantSpeed):
+            raise InputError(
+                "a speed can only be added to an angle or displacement that is a number",
+                field="speed",
+                value=entry.speed,
+                remedy="write it into the profile",
+            )
+        profile = replace(profile, speed=entry.speed)
     _try(profile, duration)
     return profile
 
@@ -116,8 +118,12 @@ def _try(profile: TimeProfile, duration: float | None) -> None:
 
 def quantities(entry: PrescribedTable) -> set[str]:
     """Return which of "angle" and "displacement" occur in a [prescribed.NAME] table."""
-    tables: list[PrescribedTable | PieceTable] = [entry, *(entry.pieces or [])]
-    return {name for table in tables for name in ("angle", "displacement") if getattr(table, name) is not None}
+    return {name for table in (entry, *(entry.pieces or [])) for name in _quantities(table)}
+
+
+def _quantities(table: Any) -> list[str]:
+    """Return the quantities whose number or expression is given in a table or a piece of one."""
+    return [name for name in ("angle", "displacement", "force", "torque") if getattr(table, name, None) is not None]
 
 
 def profile_table(profile: TimeProfile, quantity: str) -> dict[str, Any]:
@@ -128,18 +134,12 @@ def profile_table(profile: TimeProfile, quantity: str) -> dict[str, Any]:
     InputError
         Profile that cannot be expressed in a file.
     """
-    match profile:
-        case ConstantSpeed(angle=angle, speed=speed, knots=()):
-            return ({} if profile.from_assembly else {quantity: angle}) | ({"speed": speed} if speed else {})
-        case ExpressionProfile(text=text, knots=()):
-            return {quantity: text}
-        case TabulatedProfile(times=times, values=values):
-            return {"table": list(zip(times, values, strict=True))}
-        case PiecewiseProfile(pieces=pieces, ends=ends):
-            last = {quantity: _piece(pieces[-1])}
-            before = zip(ends, pieces, strict=False)
-            return {"pieces": [*({"until": end, quantity: _piece(piece)} for end, piece in before), last]}
-    raise _inexpressible_profile(profile)
+    if isinstance(profile, ConstantSpeed) and not profile.knots:
+        speed = {"speed": profile.speed} if profile.speed else {}
+        return speed if profile.from_assembly else {quantity: profile.angle} | speed
+    if isinstance(profile, ConstantSpeed | ExpressionProfile) and profile.knots:
+        raise _inexpressible_profile(profile)
+    return components_table((profile,), quantity)
 
 
 def read_components(
@@ -175,45 +175,59 @@ def read_components(
         raise InputError(
             "is for tables only", field="interpolation", value=entry.interpolation, remedy="drop it, or give a table"
         )
-    if entry.table is not None:
-        times, *columns = zip(*entry.table, strict=True) if entry.table else ((), ())
-        kind = Interpolation(entry.interpolation or Interpolation.SPLINE)
-        found = [TabulatedProfile(times, column, kind) for column in columns]
-        components = tuple(profile.values[0] if len(set(profile.values)) == 1 else profile for profile in found)
-    elif entry.pieces is not None:
-        ends = _ends(entry.pieces)
-        rows = [
-            _functions(getattr(piece, quantity), parameters, f"pieces.{k}.{quantity}")
-            for k, piece in enumerate(entry.pieces)
-        ]
-        components = tuple(_joined(profiles, ends) for profiles in zip(*rows, strict=True))
-    else:
-        components = _functions(getattr(entry, quantity), parameters, quantity)
+    components = tuple(map(_number_if_constant, _profiles(entry, parameters)))
     for profile in components:
         if isinstance(profile, TimeProfile):
             _try(profile, duration)
     return components
 
 
-def _functions(given: Any, parameters: Mapping[str, float], field: str) -> tuple[InTime, ...]:
-    """Read the numbers and expressions of one quantity; expressions that do not contain the time become numbers."""
-    listed = isinstance(given, list)
-    profiles = [
-        _expression(each, parameters, f"{field}.{k}" if listed else field)
-        for k, each in enumerate(given if listed else [given])
-    ]
-    return tuple(profile.angle if isinstance(profile, ConstantSpeed) else profile for profile in profiles)
+def _profiles(entry: Any, parameters: Mapping[str, float]) -> list[TimeProfile]:
+    """Read the profile of each component of a quantity, from rows, pieces, or numbers and expressions."""
+    if entry.table is not None:
+        times, *columns = zip(*entry.table, strict=True) if entry.table else ((), ())
+        kind = getattr(entry, "interpolation", None) or Interpolation.SPLINE
+        return [TabulatedProfile(times, column, kind) for column in columns]
+    if entry.pieces is not None:
+        ends = _ends(entry.pieces)
+        rows = [_expressions(piece, parameters, f"pieces.{k}") for k, piece in enumerate(entry.pieces)]
+        return [PiecewiseProfile(pieces, ends) for pieces in zip(*rows, strict=True)]
+    return _expressions(entry, parameters)
 
 
-def _joined(profiles: Sequence[InTime], ends: list[float]) -> InTime:
-    """Join pieces to one profile, or to a number if all pieces are the same number."""
-    first = profiles[0]
-    if not isinstance(first, TimeProfile) and all(profile == first for profile in profiles):
-        return first
-    return PiecewiseProfile(
-        tuple(profile if isinstance(profile, TimeProfile) else ConstantSpeed(profile, 0.0) for profile in profiles),
-        tuple(ends),
-    )
+def _expressions(table: Any, parameters: Mapping[str, float], place: str = "") -> list[TimeProfile]:
+    """Read the numbers and expressions of the one quantity of a table or piece; `place` is that of a piece."""
+    given = _quantities(table)
+    if len(given) != 1:
+        raise InputError(
+            "a piece needs one profile, an angle or a displacement",
+            field=place,
+            remedy="give its angle, or its displacement where the joint slides",
+        )
+    field, value = f"{place}.{given[0]}".strip("."), getattr(table, given[0])
+    if isinstance(value, list):
+        return [_expression(each, parameters, f"{field}.{k}") for k, each in enumerate(value)]
+    return [_expression(value, parameters, field)]
+
+
+def _expression(given: float | str, parameters: Mapping[str, float], field: str) -> TimeProfile:
+    """Read a number or an expression; one that does not contain the time is a constant."""
+    if isinstance(given, str) and not is_constant(given):
+        return ExpressionProfile(given, parameters, field)
+    with expressed_in(field, given):
+        return ConstantSpeed(evaluate(given, parameters) if isinstance(given, str) else given, 0.0)
+
+
+def _number_if_constant(profile: TimeProfile) -> InTime:
+    """Return a number for a constant profile, and for pieces or rows of one and the same number."""
+    pieces = profile.pieces if isinstance(profile, PiecewiseProfile) else (profile,)
+    if isinstance(profile, TabulatedProfile):
+        values = profile.values
+    elif all(isinstance(piece, ConstantSpeed) for piece in pieces):
+        values = [piece.angle for piece in pieces if isinstance(piece, ConstantSpeed)]
+    else:
+        return profile
+    return values[0] if len(set(values)) == 1 else profile
 
 
 def components_table(components: Sequence[InTime], quantity: str) -> dict[str, Any]:
@@ -305,40 +319,7 @@ def _unlike(components: Sequence[InTime]) -> InputError:
     )  # fmt: skip
 
 
-def _profile(entry: PrescribedTable, parameters: Mapping[str, float]) -> TimeProfile:
-    if entry.table is not None:
-        times, values = zip(*entry.table, strict=True) if entry.table else ((), ())
-        return TabulatedProfile(times, values)
-    if entry.pieces is not None:
-        return _pieces(entry.pieces, parameters)
-    field, given = _place(entry)
-    if given is None:
-        return ConstantSpeed(0.0, entry.speed or 0.0, from_assembly=True)
-    return _expression(given, parameters, field, entry.speed or 0.0)
-
-
-def _place(table: PrescribedTable | PieceTable) -> tuple[str, Any]:
-    """Return the field name and the value of the angle or displacement in a table; the value is None without either."""
-    return ("angle", table.angle) if table.displacement is None else ("displacement", table.displacement)
-
-
-def _pieces(pieces: list[PieceTable], parameters: Mapping[str, float]) -> PiecewiseProfile:
-    profiles = []
-    for number, piece in enumerate(pieces):
-        field = f"pieces.{number}"
-        if (piece.angle is None) == (piece.displacement is None):
-            raise InputError(
-                "a piece needs one profile, an angle or a displacement",
-                field=field,
-                remedy="give its angle, or its displacement where the joint slides",
-            )
-        name, given = _place(piece)
-        assert given is not None
-        profiles.append(_expression(given, parameters, f"{field}.{name}"))
-    return PiecewiseProfile(tuple(profiles), tuple(_ends(pieces)))
-
-
-def _ends(pieces: Sequence[Any]) -> list[float]:
+def _ends(pieces: Sequence[Any]) -> tuple[float, ...]:
     """Return the end times of all pieces but the last [s]."""
     for number, piece in enumerate(pieces):
         if (piece.until is None) != (number == len(pieces) - 1):
@@ -346,13 +327,4 @@ def _ends(pieces: Sequence[Any]) -> list[float]:
                 "every piece but the last has an end, and the last has none", field=f"pieces.{number}.until",
                 value=piece.until, remedy="give the time in s at which the next one takes over; the last goes on",
             )  # fmt: skip
-    return [piece.until for piece in pieces[:-1]]
-
-
-def _expression(given: float | str, parameters: Mapping[str, float], field: str, speed: float = 0.0) -> TimeProfile:
-    if not isinstance(given, str):
-        return ConstantSpeed(given, speed)
-    if is_constant(given):
-        with expressed_in(field, given):
-            return ConstantSpeed(evaluate(given, parameters), speed)
-    return ExpressionProfile(given, parameters, field)
+    return tuple(piece.until for piece in pieces[:-1])

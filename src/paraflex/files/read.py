@@ -34,12 +34,12 @@ _NO_TABLE = ("dict_type", "model_type", "model_attributes_type")
 T = typing.TypeVar("T", bound=BaseModel)
 
 
-def read_toml(path: Path, source: str) -> dict[str, Any]:
+def read_toml(path: Path) -> dict[str, Any]:
     """Parse a TOML file; see `read_text` and `parse_toml` for the errors."""
-    return parse_toml(read_text(path, source), source)
+    return parse_toml(read_text(path))
 
 
-def read_text(path: Path, source: str) -> str:
+def read_text(path: Path) -> str:
     """Read the text of a TOML file.
 
     Raises
@@ -47,8 +47,7 @@ def read_text(path: Path, source: str) -> str:
     InputError
         Unreadable file; see `text_of`.
     """
-    with naming(source):
-        return text_of(path, "file", None, unread="check its name", wrong="name a TOML file")
+    return text_of(path, "file", None, unread="check its name", wrong="name a TOML file")
 
 
 def text_of(path: Path, field: str, name: str | None, *, unread: str, wrong: str) -> str:
@@ -99,7 +98,7 @@ def exists(path: Path) -> bool:
         return False
 
 
-def parse_toml(text: str, source: str) -> dict[str, Any]:
+def parse_toml(text: str) -> dict[str, Any]:
     """Parse a TOML text.
 
     Raises
@@ -107,19 +106,18 @@ def parse_toml(text: str, source: str) -> dict[str, Any]:
     InputError
         Text that is not valid TOML, or has names that are too long.
     """
-    with naming(source):
-        if _DEEP_KEY.search(text):
-            remedy = f"at most {KEY_PARTS} between dots"
-            raise InputError("not valid TOML: a name of too many parts", field="file", remedy=remedy)
-        try:
-            data = tomllib.loads(text)
-        except tomllib.TOMLDecodeError as error:
-            raise _not_toml(str(error), text) from error
-        except (ValueError, RecursionError):
-            problem = "not valid TOML: a number of too many digits, or too many nested brackets"
-            raise InputError(problem, field="file", remedy="name a model file") from None
-        _check_names(data)
-        return data
+    if _DEEP_KEY.search(text):
+        remedy = f"at most {KEY_PARTS} between dots"
+        raise InputError("not valid TOML: a name of too many parts", field="file", remedy=remedy)
+    try:
+        data = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        raise _not_toml(str(error), text) from error
+    except (ValueError, RecursionError):
+        problem = "not valid TOML: a number of too many digits, or too many nested brackets"
+        raise InputError(problem, field="file", remedy="name a model file") from None
+    _check_names(data)
+    return data
 
 
 def _check_names(data: dict[str, Any]) -> None:

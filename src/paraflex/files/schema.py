@@ -6,7 +6,7 @@ field (positive lengths, points that exist) are checked once, in `mechanism.chec
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import MISSING, fields
 from enum import Enum
 from functools import reduce
@@ -30,12 +30,35 @@ from pydantic_core import PydanticCustomError
 
 from paraflex.control.laws.described import ControllerDescription, References
 from paraflex.control.laws.kinds import LAWS
-from paraflex.equilibria.conditions import FACTORS, STEPS
+from paraflex.control.shaping.shapers import Shaper
+from paraflex.equilibria.conditions import StaticsDefaults
 from paraflex.files.expressions import CONSTANTS, ExpressionError, check_in_time, evaluate
+from paraflex.files.study import StudyDefaults
+from paraflex.kinematics import Circle, Line, Path, PointPath, Polygon, SequencePath, TabulatedPath
 from paraflex.limits import LARGEST, TEXT_LETTERS, WHOLE
-from paraflex.mechanism import JOINT_KINDS, Mechanism, PointRef, groups_of
+from paraflex.mechanism import (
+    JOINT_KINDS,
+    AssumedModesBeam,
+    Damping,
+    Deflection,
+    EndEffector,
+    FlexibleBeam,
+    LumpedMass,
+    Material,
+    Mechanism,
+    ModalBody,
+    ModalPoint,
+    Payload,
+    PointRef,
+    RigidBody,
+    Section,
+    ShapeFunction,
+    groups_of,
+)
+from paraflex.mechanism.bodies import BODY_KINDS
 from paraflex.mechanism.loads import InTime
 from paraflex.mechanism.quantities import joint_pair
+from paraflex.mechanism.sections import SHAPES
 
 
 def _number(value: Any, info: ValidationInfo) -> Any:
@@ -153,10 +176,7 @@ def _in_time(hint: Any, name: str, description: str) -> dict[str, Any]:
     pieces: Any = Annotated[list[piece], Field(min_length=1)]
     example = f"a list of {{ until = s, {name} = ... }}, the last without until"
     return {
-        name: (
-            written | None,
-            _optional(f"{description}, numbers or expressions of the time t"),
-        ),
+        name: (written | None, _optional(description)),
         "pieces": (pieces | None, _optional(example)),
         "table": (rows | None, _optional(f"a list of {columns} such columns")),
         "interpolation": (InterpolationName | None, _INTERPOLATION),
@@ -209,10 +229,13 @@ def _written(hint: Any) -> Any:
     return list[_written(inner[0])]
 
 
-def _fields_of(member: type, *, needed: bool = True, without: Sequence[str] = ("name",)) -> dict[str, Any]:
+def _fields_of(
+    member: type, *, needed: bool = True, without: Sequence[str] = ("name",), **written: Any
+) -> dict[str, Any]:
     """Return the fields of a member's table from those of its class, with two points or joints in one field.
 
-    If `needed` is False, all fields become optional.
+    If `needed` is False, all fields become optional. `written` are types of fields that files write in another way than
+    their annotations say; such a field is None by default if it may be.
     """
     hints, found = get_type_hints(member), {}
     together = [*without]
@@ -224,15 +247,31 @@ def _fields_of(member: type, *, needed: bool = True, without: Sequence[str] = ("
         found["joints"] = (TwoJoints, Field(description=f"[{', '.join(pair)}]"))
         together += joints
     for each in fields(member):
-        if each.name not in together:
+        if each.name in together:
+            continue
+        hint, description = hints[each.name], each.metadata.get("description", f"its {each.name}")
+        if hint in _IN_TIME:
+            found |= _in_time(hint, each.name, description)
+        elif hint == tuple[ShapeFunction, ...]:
+            found |= _of_shapes(each.name)
+        else:
+            kind = written.get(each.name) or _written(hint)
             default = each.default if each.default_factory is MISSING else each.default_factory()
             default = (... if needed else None) if default is MISSING else getattr(default, "value", default)
-            description = each.metadata.get("description", f"its {each.name}")
-            if hints[each.name] in _IN_TIME:
-                found |= _in_time(hints[each.name], each.name, description)
-                continue
-            found[each.name] = (_written(hints[each.name]), Field(default, description=description))
+            if each.name in written and NoneType in get_args(kind):
+                default = None
+            elif default == ():
+                default = {} if get_origin(kind) is dict else []
+            found[each.name] = (kind, Field(default, description=description))
     return found
+
+
+def _of_shapes(direction: str) -> dict[str, Any]:
+    """Return the fields of a table for the shape functions of a bar in a direction."""
+    return {
+        f"{direction}_sines": (Count, _optional("the number of shapes sin(n pi z), n = 1, 2, ...", 0)),
+        f"{direction}_polynomials": (list[list[Number]], _optional("a list of coefficients, ascending in z", [])),
+    }
 
 
 def _choice(words: Sequence[str], known: Sequence[str]) -> Any:
@@ -241,176 +280,89 @@ def _choice(words: Sequence[str], known: Sequence[str]) -> Any:
     return Literal[tuple(words)], Field(description=f"{', '.join(quoted[:-1])} or {quoted[-1]}")
 
 
-def _member_table(members: Sequence[Any], base: type[_Table] = _Table) -> Any:
+def _table_of(one: Any, kinds: Mapping[str, Any] | None = None, base: type[_Table] = _Table, **others: Any) -> Any:
+    """Return the table of a class, with the fields of a base table as well, and with a `type` if it is one of kinds."""
+    entries = _fields_of(one, **others)
+    if kinds and len(kinds) > 1:
+        entries = {"type": _choice([kind for kind, each in kinds.items() if each is one], list(kinds))} | entries
+    about = one.__doc__.partition("\n\n")[0]
+    return create_model(f"{one.__name__}Table", __base__=base, __doc__=about, **entries)
+
+
+def _member_table(kinds: Mapping[str, Any], base: type[_Table] = _Table) -> Any:
     """Return the table of a member that belongs to one of several classes, with the fields of a base table as well."""
-    tables = []
-    for one in members:
-        entries = _fields_of(one)
-        if len(members) > 1:
-            entries = {"type": _choice([one.kind], [each.kind for each in members])} | entries
-        about = one.__doc__.partition("\n\n")[0]
-        tables.append(create_model(f"{one.__name__}Table", __base__=base, __doc__=about, **entries))
+    tables = [_table_of(one, kinds, base) for one in kinds.values()]
     return tables[0] if len(tables) == 1 else Annotated[reduce(or_, tables), Field(discriminator="type")]
 
 
-def _joint_table() -> Any:
-    """Return the table of a joint of any kind, with the fields of all kinds, all of them optional."""
-    found = {"type": _choice(list(JOINT_KINDS), list(JOINT_KINDS))}
-    for kind in JOINT_KINDS.values():
-        found = found | {name: one for name, one in _fields_of(kind, needed=False).items() if name not in found}
-    return create_model("JointTable", __base__=_Table, __doc__="A joint of any kind between two points.", **found)
+def _table_of_any(kinds: Iterable[type], **entries: Any) -> Any:
+    """Return a table with some entries and with the fields of several classes, all of them optional."""
+    for kind in kinds:
+        entries |= _fields_of(kind, needed=False, without=("name", *entries))
+    return create_model("AnyTable", __base__=_Table, **entries)
 
 
-class SectionTable(_Table):
+class SectionTable(
+    _table_of_any(
+        [*SHAPES.values(), Section],
+        shape=(
+            Literal["rectangle", "round", "tube"] | None,
+            _optional('"rectangle", "round" or "tube"; by default a rectangle, or by area and second_moment'),
+        ),
+    )
+):
     """A cross-section, given by its shape or by its properties; the fields depend on the shape."""
 
-    shape: Literal["rectangle", "round", "tube"] | None = _optional(
-        '"rectangle", "round" or "tube"; by default a rectangle, or by area and second_moment'
-    )
-    width: Number | None = _optional("the width out of the plane of motion in m")
-    thickness: Number | None = _optional("the thickness in the plane of motion in m")
-    diameter: Number | None = _optional("the outer diameter in m")
-    wall: Number | None = _optional("the thickness of the wall of a hollow section in m")
-    area: Number | None = _optional("the area in m^2")
-    second_moment: Number | None = _optional("the second moment of area in m^4")
-    outer_fibre: Number | None = _optional("the distance of the outermost fibre from the neutral axis in m")
 
-
-class MaterialTable(_Table):
+class MaterialTable(_table_of(Material)):
     """A material."""
 
-    youngs_modulus: Number = Field(description="Young's modulus in Pa")
-    density: Number = Field(description="the density in kg/m^3")
-    strength: Number | None = _optional("the largest admissible stress in Pa")
 
-
-class LumpTable(_Table):
+class LumpTable(_table_of(LumpedMass, without=("point",))):
     """A lumped mass."""
 
-    mass: Number = Field(description="the mass in kg")
-    inertia: Number = _optional("the moment of inertia in kg m^2", 0.0)
 
-
-class DampingTable(_Table):
+class DampingTable(_table_of_any(get_args(Damping))):
     """Structural damping of a body: modal damping ratios, a loss factor, or Rayleigh damping."""
 
-    ratios: list[Number] = _optional(
-        "the damping ratio of each mode of the body as its joints hold it; the last applies to all others", []
-    )
-    loss_factor: Number = _optional("twice the damping ratio at the frequency, of stiffness-proportional damping", 0.0)
-    frequency: Number = _optional("the frequency in Hz at which the loss factor holds", 0.0)
-    mass: Number = _optional("the mass-proportional coefficient in 1/s, of the body as it is held", 0.0)
-    stiffness: Number = _optional("the stiffness-proportional coefficient in s", 0.0)
+
+class ModalPointTable(_table_of(ModalPoint, position=Pair)):
+    """A point of a body given by its matrices."""
 
 
+_WRITTEN |= {
+    Section: Text, Material: Text, tuple[LumpedMass, ...]: dict[str, Text], Damping | None: DampingTable | None,
+    ModalPoint: ModalPointTable,
+}  # fmt: skip
 ReferenceName = Literal["pinned", "cantilever", "free"]
 CurvatureName = Literal["separate", "shared"]
-ReductionName = Literal["modal", "craig-bampton"]
 
 
-class BeamTable(_Table):
+class BeamTable(_table_of(FlexibleBeam, BODY_KINDS, reference=ReferenceName | None, curvature=CurvatureName | None)):
     """A flexible beam along its x axis."""
 
-    type: Literal["beam"] = Field(description='"beam", "rigid", "assumed-modes" or "modal"')
-    length: Number = Field(description="the length in m")
-    section: Text | list[Text] = Field(description="the name of a [section.NAME] table, or one per span")
-    material: Text | list[Text] = Field(description="the name of a [material.NAME] table, or one per span")
-    points: dict[str, Number] = _optional("the distance of each named point from the start in m", {})
-    elements: Count | list[Count] | None = _optional(
-        "elements per span, one number or one per span; by default 1, and where a joint slides along "
-        "the beam enough that none is longer than a third of it"
-    )
-    lumps: dict[str, Text] = _optional("the name of a [lump.NAME] table for each point", {})
-    reference: ReferenceName | None = _optional(
-        'how its frame is fixed to the beam: "pinned", "cantilever" or "free"; the model\'s by default'
-    )
-    curvature: CurvatureName | None = _optional(
-        'curvature at lumped moments of inertia: "separate" or "shared"; the model\'s by default'
-    )
-    modes: Count | None = _optional("the number of modes of lowest frequency to keep")
-    reduction: ReductionName = _optional(
-        'the reduction basis with modes: "modal", modes in its frame; "craig-bampton", modes with its joints '
-        "held, and static shapes of these",
-        "modal",
-    )
-    damping: DampingTable | None = _optional("a damping table")
-    flexible: Yes = _optional("false for a rigid beam", True)
-    frames: Count = _optional(
-        "the number of floating frames of equal length, joined rigidly: more for large deflections", 1
-    )
 
-
-class RigidTable(_Table):
+class RigidTable(_table_of(RigidBody, BODY_KINDS)):
     """A rigid body."""
 
-    type: Literal["rigid"] = Field(description='"beam", "rigid", "assumed-modes" or "modal"')
-    mass: Number = Field(description="the mass in kg")
-    inertia: Number = Field(description="the moment of inertia about the centre of mass in kg m^2")
-    centre_of_mass: Pair = _optional("[x, y] in the body frame in m", [0.0, 0.0])
-    points: dict[str, Pair] = _optional("[x, y] of each named point in the body frame in m", {})
+
+class AssumedModesTable(_table_of(AssumedModesBeam, BODY_KINDS)):
+    """A beam along its x axis that deforms in given shape functions of z = x/length."""
 
 
-if TYPE_CHECKING:
+class ModalTable(_table_of(ModalBody, BODY_KINDS, first_moment=Pair)):
+    """A flexible body given by its matrices."""
 
-    class JointTable(_Table):
-        """Fields common to all joints."""
 
-        type: str
-        points: list[str]
-else:
-    JointTable = _joint_table()
+class JointTable(_table_of_any(JOINT_KINDS.values(), type=_choice(list(JOINT_KINDS), list(JOINT_KINDS)))):
+    """A joint of any kind between two points."""
+
 
 # A revolute joint may be written as its two points alone. The tags are chosen such that errors do not show them.
 JointEntry = Annotated[
     Annotated[TwoPoints, Tag("list[point]")] | Annotated[JointTable, Tag("JointTable")],
     Discriminator(lambda value: "JointTable" if isinstance(value, dict) else "list[point]"),
 ]
-
-
-class AssumedModesTable(_Table):
-    """A beam along its x axis that deforms in given shape functions of z = x/length."""
-
-    type: Literal["assumed-modes"] = Field(description='"beam", "rigid", "assumed-modes" or "modal"')
-    length: Number = Field(description="the length in m")
-    section: Text = Field(description="the name of a [section.NAME] table")
-    material: Text = Field(description="the name of a [material.NAME] table")
-    transverse_sines: Count = _optional("the number of shapes sin(n pi z), n = 1, 2, ...", 0)
-    transverse_polynomials: list[list[Number]] = _optional("a list of coefficients, ascending in z", [])
-    axial_sines: Count = _optional("the number of shapes sin(n pi z), n = 1, 2, ...", 0)
-    axial_polynomials: list[list[Number]] = _optional("a list of coefficients, ascending in z", [])
-    points: dict[str, Number] = _optional("the distance of each named point from the start in m", {})
-    lumps: dict[str, Text] = _optional("the name of a [lump.NAME] table for each point", {})
-    modes: Count | None = _optional("the number of modes of lowest frequency to keep")
-    damping: DampingTable | None = _optional("a damping table")
-    flexible: Yes = _optional("false for a rigid bar", True)
-
-
-class ModalPointTable(_Table):
-    """A point of a body given by its matrices."""
-
-    position: Pair = Field(description="[x, y] in the body frame in m")
-    shape: list[list[Number]] = Field(description="two rows, displacement along x and y per flexible coordinate")
-    slope: list[Number] = Field(description="the rotation per flexible coordinate")
-
-
-class ModalTable(_Table):
-    """A flexible body given by its matrices."""
-
-    type: Literal["modal"] = Field(description='"beam", "rigid", "assumed-modes" or "modal"')
-    mass: Number = Field(description="the mass in kg")
-    first_moment: Pair = Field(description="[x, y], mass times the centre of mass in kg m")
-    inertia: Number = Field(description="the moment of inertia about the body frame's origin in kg m^2")
-    mass_matrix: list[list[Number]] = Field(description="rows of the mass matrix of the flexible coordinates")
-    stiffness: list[list[Number]] = Field(description="rows of the stiffness matrix")
-    S2: list[list[Number]] = Field(description="two rows, int N dm")
-    I1: list[Number] = Field(description="int s0^T N dm")
-    G1: list[Number] = Field(description="int (x N_y - y N_x) dm")
-    G2: list[list[Number]] = Field(description="rows of the skew int (N_x^T N_y - N_y^T N_x) dm")
-    I2: list[list[Number]] | None = _optional("rows of int N^T N dm")
-    points: dict[str, ModalPointTable] = _optional("position, shape and slope of each named point", {})
-    modes: Count | None = _optional("the number of modes of lowest frequency to keep")
-    damping: DampingTable | None = _optional("a damping table")
-    flexible: Yes = _optional("false for a rigid body", True)
 
 
 class PieceTable(_Table):
@@ -456,12 +408,8 @@ class AssemblyTable(BaseModel):
         return dict(self.__pydantic_extra__ or {})
 
 
-class DeflectionTable(_Table):
+class DeflectionTable(_table_of(Deflection)):
     """Deflection of a point of a beam from its undeformed position in the body frame."""
-
-    axial: Number | None = _optional("the displacement along the beam in m")
-    transverse: Number | None = _optional("the displacement across the beam in m")
-    slope: Number | None = _optional("the slope in rad")
 
 
 class CoordinatesTable(_Table):
@@ -500,22 +448,12 @@ class StartTable(_Table):
     rates: dict[str, RatesTable] = _optional("rates of x, y, phi and flexible of bodies", {})
 
 
-class EndEffectorTable(_Table):
+class EndEffectorTable(_table_of(EndEffector)):
     """The end-effector, a point that follows a path."""
 
-    point: Text = Field(description='"body.point"')
-    coordinates: list[Text] = _optional('task coordinates from "x", "y", "angle"', ["x", "y"])
 
-
-class PayloadTable(_Table):
+class PayloadTable(_table_of(Payload)):
     """A payload fixed to the point of the end-effector."""
-
-    mass: Number = Field(description="the mass in kg")
-    inertia: Number = _optional("the moment of inertia about its centre of mass in kg m^2", 0.0)
-    offset: Pair = _optional(
-        "[x, y] in m from the end-effector's point to its centre of mass, in the frame of the body that carries it",
-        [0.0, 0.0],
-    )
 
 
 class ShaperTable(_Table):
@@ -535,15 +473,6 @@ class _PathTable(_Table):
     shaper: ShaperTable | None = _optional("the input shaper of the path: none by default")
 
 
-class PolygonTable(_PathTable):
-    """Straight segments from corner to corner."""
-
-    type: Literal["polygon"]
-    corners: list[Pair] = Field(description="a list of [x, y] in m")
-    max_acceleration: Number = Field(description="the largest acceleration in m/s^2")
-    closed: Yes = _optional("whether the path returns to its start", True)
-
-
 class LineTable(_PathTable):
     """A straight line."""
 
@@ -553,62 +482,46 @@ class LineTable(_PathTable):
     max_acceleration: Number = Field(description="the largest acceleration in m/s^2")
 
 
-class CircleTable(_PathTable):
-    """A circle or arc."""
-
-    type: Literal["circle"]
-    centre: Pair = Field(description="[x, y] in m")
-    radius: Number = Field(description="the radius in m")
-    max_acceleration: Number = Field(description="the largest acceleration along the path in m/s^2")
-    start_angle: Number = _optional("the angle of the first point in rad", 0.0)
-    sweep: Number = _optional("the angle swept in rad, positive counter-clockwise", 6.283185307179586)
+# Path classes by the name of their type in files.
+PATHS: dict[str, Any] = {
+    "polygon": Polygon, "line": Line, "circle": Circle, "points": PointPath, "table": TabulatedPath,
+    "sequence": SequencePath,
+}  # fmt: skip
 
 
-class PointsTable(_PathTable):
-    """A smooth motion through points."""
-
-    type: Literal["points"]
-    points: list[Annotated[list[Number], Field(min_length=2, max_length=3)]] = Field(
-        description="a list of [x, y] in m, or of [x, y, angle] in m and rad"
-    )
-    motion_time: Number = Field(description="the time from the first point to the last in s")
-
-
-class TabulatedPathTable(_PathTable):
+class TabulatedPathTable(_table_of(TabulatedPath, PATHS, _PathTable, without=("points", "times"))):
     """A smooth curve through many points, such as points read from a file."""
 
-    type: Literal["table"]
     table: PathRows = Field(
         description="a list of [x, y] in m, or of [x, y, t] in m and s, or the name of a file with such columns"
     )
-    motion_time: Number | None = _optional("the time from the first point to the last in s")
-    max_acceleration: Number | None = _optional("the largest acceleration along the path in m/s^2")
-    max_speed: Number | None = _optional("the largest speed along the path in m/s")
 
 
-class SequenceTable(_PathTable):
+_WRITTEN[Path] = Text
+
+
+class SequenceTable(_table_of(SequencePath, PATHS, _PathTable)):
     """Several paths, one after the other, in one motion."""
 
-    type: Literal["sequence"]
-    paths: list[Text] = Field(description="names of other [path.NAME] tables, in order")
-    dwell: Number = _optional("the dwell between two paths in s", 0.0)
 
-
+_NEAR = list[Annotated[list[Number], Field(min_length=2, max_length=3)]]
 PathTable = Annotated[
-    PolygonTable | LineTable | CircleTable | PointsTable | TabulatedPathTable | SequenceTable,
+    _table_of(Polygon, PATHS, _PathTable)
+    | LineTable
+    | _table_of(Circle, PATHS, _PathTable)
+    | _table_of(PointPath, PATHS, _PathTable, points=_NEAR)
+    | TabulatedPathTable
+    | SequenceTable,
     Field(discriminator="type"),
 ]
 
 
-class TorqueTable(_Table):
-    """The torque of a motor as a profile: an expression, pieces or a table."""
-
-    torque: FunctionOfTime | None = _optional("the torque in N m, an expression of the time t")
-    pieces: Annotated[list[TorquePiece], Field(min_length=1)] | None = _optional(
-        "a list of { until = s, torque = ... }, the last without until"
+class TorqueTable(
+    create_model(
+        "_Torque", __base__=_Table, **_in_time(InTime, "torque", "the torque in N m, an expression of the time t")
     )
-    table: Rows | None = _optional("a list of [t, torque] in s and N m, or the name of a file with two such columns")
-    interpolation: InterpolationName | None = _INTERPOLATION
+):
+    """The torque of a motor as a profile: an expression, pieces or a table."""
 
 
 # A number or an expression of the time, or a table. The tags are chosen such that errors do not show them.
@@ -630,53 +543,14 @@ _CONTROLLER = create_model(
 if TYPE_CHECKING:
     AnyControllerTable = Any
 else:
-    AnyControllerTable = _member_table(list(LAWS.values()), _CONTROLLER)
+    AnyControllerTable = _member_table(LAWS, _CONTROLLER)
 
 
-class StudyDefaultsTable(_Table):
+_WRITTEN |= {Mapping[str, InTime]: dict[str, TorqueEntry], Shaper | None: ShaperTable | None}
+
+
+class StudyDefaultsTable(_table_of(StudyDefaults)):
     """Default settings of `paraflex run`."""
-
-    path: Text | None = _optional("the name of a [path.NAME] table")
-    paths: list[Text] = _optional(
-        "several names in place of path: runs and studies of many designs take all, others the first", []
-    )
-    modes: list[Text] = _optional("actuation modes by name, signs or motor names", [])
-    duration: Number | None = _optional("the duration in s, dwell included")
-    samples: Count = _optional("the number of samples kept", 701)
-    assembly: Text | None = _optional("the name of an [assembly.NAME] table")
-    torques: dict[str, TorqueEntry] = _optional(
-        "torques of motors in N m, without a path: numbers, expressions of the time t, or tables", {}
-    )
-    controllers: list[Text] = _optional(
-        "names of active [controller.NAME] tables, in addition to torques planned along a path", []
-    )
-    shaper: ShaperTable | None = _optional(
-        'the input shaper of torques planned along a path, as { type = "zvd", frequencies = ["9 Hz"] }: none by default'
-    )
-    orientation: Number | None = _optional(
-        "the end-effector's angle along the path in rad, where it is a task coordinate"
-    )
-    method: Text | None = _optional("the method of integration, by default esdirk5: see paraflex methods")
-    tolerance: Number | None = _optional(
-        "the tolerance of the integration in m, 4e-5 of the mechanism's size by default"
-    )
-    tolerance_per: Literal["cycle", "run"] | None = _optional(
-        'the time over which errors may accumulate to it: a "cycle" of the motion or the "run"; own methods only'
-    )
-    control: Literal["positions", "forces"] | None = _optional(
-        'the errors that control the steps: "positions", or "forces" as well, the default of damped beams and '
-        "ESDIRK methods"
-    )
-    step: Number | None = _optional("a fixed step in s, with methods that take one")
-    after: Literal["free", "hold"] = _optional(
-        'what the active motors do after the path: "free" or "hold", by brakes', "free"
-    )
-    reduced: Count | None = _optional(
-        "the number of flexible coordinates kept, all bodies together; all by default, or with 0"
-    )
-    error: Literal["motion", "whole"] = _optional(
-        'the tracking error that ranks modes: of the "motion", or the "whole" run with dwell', "motion"
-    )
 
 
 def _quoted(value: Any) -> Any:
@@ -690,22 +564,8 @@ def _quoted(value: Any) -> Any:
 NumbersByName = Annotated[dict[str, Number], BeforeValidator(_quoted, json_schema_input_type=dict[str, float | str])]
 
 
-class StaticsTable(_Table):
+class StaticsTable(_table_of(StaticsDefaults, loads=NumbersByName, torques=NumbersByName, moved=NumbersByName)):
     """Default settings of `paraflex statics`."""
-
-    loads: NumbersByName = _optional(
-        'the force in N or torque in N m at each joint, "body.point.x", ".y" or ".angle"', {}
-    )
-    torques: NumbersByName = _optional("the torque of each motor in N m", {})
-    moved: NumbersByName = _optional(
-        'the travel in m or rad of each joint, "body.point.x", ".y" or ".angle" from the start', {}
-    )
-    held: list[Text] | None = _optional("coordinates held fixed; by default the joints of motors without a torque")
-    steps: Count = _optional("the number of equal steps of loads and travels", STEPS)
-    stiffness: list[Text] | None = _optional(
-        "coordinates whose stiffness is computed; by default those loaded or moved"
-    )
-    buckling: Count = _optional("the number of buckling factors about every equilibrium", FACTORS)
 
 
 class _Parts(_Table):
@@ -736,7 +596,9 @@ class _Parts(_Table):
 
 
 _GROUPS: dict[str, Any] = {
-    one.table: (dict[str, _member_table(one.kinds)], {}) for one in groups_of(Mechanism).values() if one.kinds
+    one.table: (dict[str, _member_table({getattr(kind, "kind", ""): kind for kind in one.kinds})], {})
+    for one in groups_of(Mechanism).values()
+    if one.kinds
 }
 _WithGroups = create_model("_WithGroups", __base__=_Parts, **_GROUPS)
 

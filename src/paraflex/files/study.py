@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
-from typing import Any
+from dataclasses import dataclass, replace
+from typing import Any, Literal
 
 from paraflex.control.shaping.shapers import Shaper
 from paraflex.errors import InputError, renamed, within
@@ -12,7 +12,7 @@ from paraflex.integrators import DEFAULT_METHOD, IntegrationOptions, check_times
 from paraflex.kinematics import Path
 from paraflex.mechanism import Mechanism, parse_mode
 from paraflex.mechanism.loads import InTime
-from paraflex.mechanism.quantities import known
+from paraflex.mechanism.quantities import known, optional
 
 
 @dataclass(frozen=True)
@@ -58,24 +58,49 @@ class StudyDefaults:
         Input shaper of the torques planned along a path; see `shape_torques`.
     """
 
-    path: str | None = None
-    paths: tuple[str, ...] = ()
-    modes: tuple[str, ...] = ()
-    duration: float | None = None
-    samples: int = 701
-    assembly: str | None = None
-    torques: Mapping[str, InTime] = field(default_factory=dict)
-    orientation: float = 0.0
-    method: str | None = None
-    tolerance: float | None = None
-    tolerance_per: str | None = None
-    control: str | None = None
-    step: float | None = None
-    after: str = "free"
-    reduced: int | None = None
-    error: str = "motion"
-    controllers: tuple[str, ...] = ()
-    shaper: Shaper | None = None
+    path: str | None = optional(None, "the name of a [path.NAME] table")
+    paths: tuple[str, ...] = optional(
+        (), "several names in place of path: runs and studies of many designs take all, others the first"
+    )
+    modes: tuple[str, ...] = optional((), "actuation modes by name, signs or motor names")
+    duration: float | None = optional(None, "the duration in s, dwell included")
+    samples: int = optional(701, "the number of samples kept")
+    assembly: str | None = optional(None, "the name of an [assembly.NAME] table")
+    torques: Mapping[str, InTime] = optional(
+        {}, "torques of motors in N m, without a path: numbers, expressions of the time t, or tables"
+    )
+    orientation: float = optional(0.0, "the end-effector's angle along the path in rad, where it is a task coordinate")
+    method: str | None = optional(None, "the method of integration, by default esdirk5: see paraflex methods")
+    tolerance: float | None = optional(
+        None, "the tolerance of the integration in m, 4e-5 of the mechanism's size by default"
+    )
+    tolerance_per: Literal["cycle", "run"] | None = optional(
+        None,
+        'the time over which errors may accumulate to it: a "cycle" of the motion or the "run"; own methods only',
+    )
+    control: Literal["positions", "forces"] | None = optional(
+        None,
+        'the errors that control the steps: "positions", or "forces" as well, the default of damped beams and ESDIRK '
+        "methods",
+    )
+    step: float | None = optional(None, "a fixed step in s, with methods that take one")
+    after: Literal["free", "hold"] = optional(
+        "free", 'what the active motors do after the path: "free" or "hold", by brakes'
+    )
+    reduced: int | None = optional(
+        None, "the number of flexible coordinates kept, all bodies together; all by default, or with 0"
+    )
+    error: Literal["motion", "whole"] = optional(
+        "motion", 'the tracking error that ranks modes: of the "motion", or the "whole" run with dwell'
+    )
+    controllers: tuple[str, ...] = optional(
+        (), "names of active [controller.NAME] tables, in addition to torques planned along a path"
+    )
+    shaper: Shaper | None = optional(
+        None,
+        'the input shaper of torques planned along a path, as { type = "zvd", frequencies = ["9 Hz"] }: none by '
+        "default",
+    )
 
     @property
     def first_path(self) -> str | None:

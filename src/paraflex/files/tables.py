@@ -13,8 +13,8 @@ from paraflex.control.shaping.shapers import Shaper
 from paraflex.errors import InputError, within
 from paraflex.files.controllers import controller_table
 from paraflex.files.field_values import changed_fields, inexpressible
-from paraflex.files.mechanism import PATHS
 from paraflex.files.profiles import components_table, profile_parameters, profile_table
+from paraflex.files.schema import PATHS
 from paraflex.files.study import StudyDefaults
 from paraflex.kinematics import Path, SequencePath, TabulatedPath
 from paraflex.mechanism import (
@@ -37,9 +37,10 @@ from paraflex.mechanism import (
     TimeProfile,
     grouped,
 )
+from paraflex.mechanism.bodies import BODY_KINDS
 from paraflex.mechanism.quantities import joint_pair
 
-_BODIES = {RigidBody: "rigid", FlexibleBeam: "beam", AssumedModesBeam: "assumed-modes", ModalBody: "modal"}
+_BODIES = {kind: name for name, kind in BODY_KINDS.items()}
 # Properties of beams that a file may give once for all of them, at its top, with their defaults.
 _SHARED = {"reference": "pinned", "curvature": "separate"}
 # Tables to which bodies refer by name, with the field of a body that holds the names.

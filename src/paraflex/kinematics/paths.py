@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields
 from functools import cached_property
 from itertools import pairwise
 from math import pi
@@ -17,7 +17,7 @@ from paraflex.arrays import Array, Numbers
 from paraflex.errors import InputError
 from paraflex.kinematics.profiles import CruiseProfile, TrapezoidalProfile
 from paraflex.limits import PATH_POINTS, at_most
-from paraflex.mechanism.quantities import finite, not_negative, positive
+from paraflex.mechanism.quantities import check_numbers, field_metadata, finite, not_negative, optional, positive
 
 # Number of Gauss points for the length between two knots of a path, or two points of a curve.
 _LENGTH_POINTS = 40
@@ -28,6 +28,8 @@ _BISECTIONS, _SAME_KNOT = 60, 1e-6
 _LEAST_POINTS = 4
 # Largest gap between paths of a sequence, relative to coordinates above 1 m: rounding of coordinates in files.
 _GAP = 1e-9
+_ALONG = field_metadata("the largest acceleration along the path in m/s^2", positive)
+_TIME = field_metadata("the time from the first point to the last in s", positive, "seconds")
 
 
 class PathMotion(NamedTuple):
@@ -82,15 +84,15 @@ class Polygon(CheckedFields):
     """
 
     _own = ("corners",)
-    corners: tuple[tuple[float, float], ...]
-    max_acceleration: float
-    closed: bool = True
+    corners: tuple[tuple[float, float], ...] = field(metadata=field_metadata("a list of [x, y] in m"))
+    max_acceleration: float = field(metadata=field_metadata("the largest acceleration in m/s^2", positive))
+    closed: bool = optional(True, "whether the path returns to its start")
 
     def __post_init__(self) -> None:
         super().__post_init__()
         corners = _points(self.corners, "corners", 2)
         object.__setattr__(self, "corners", tuple(map(tuple, corners.tolist())))
-        positive(self.max_acceleration, "max_acceleration", "m/s^2")
+        check_numbers(self)
         if not np.all(self._lengths > 0.0):
             raise InputError(
                 "two neighbouring corners coincide", field="corners", value=self.corners, remedy="drop one of them"
@@ -199,21 +201,18 @@ class Circle(CheckedFields):
     """
 
     _own = ("centre",)
-    centre: tuple[float, float]
-    radius: float
-    max_acceleration: float
-    start_angle: float = 0.0
-    sweep: float = 2.0 * pi
+    centre: tuple[float, float] = field(metadata=field_metadata("[x, y] in m"))
+    radius: float = field(metadata=field_metadata("the radius in m", positive, "metres"))
+    max_acceleration: float = field(metadata=_ALONG)
+    start_angle: float = optional(0.0, "the angle of the first point in rad", finite)
+    sweep: float = optional(2.0 * pi, "the angle swept in rad, positive counter-clockwise", finite)
 
     def __post_init__(self) -> None:
         super().__post_init__()
         object.__setattr__(self, "centre", _pair(self.centre, "centre"))
-        positive(self.radius, "radius", "metres")
-        finite(self.start_angle, "start_angle")
         if not (np.isfinite(self.sweep) and self.sweep != 0.0):
             raise InputError("no angle to sweep", field="sweep", value=self.sweep, remedy="give it in rad, not zero")
-        finite(self.sweep, "sweep")
-        positive(self.max_acceleration, "max_acceleration", "m/s^2")
+        check_numbers(self)
 
     @cached_property
     def _profile(self) -> TrapezoidalProfile:
@@ -256,14 +255,16 @@ class PointPath(CheckedFields):
     """
 
     _own = ("points",)
-    points: tuple[tuple[float, ...], ...]
-    motion_time: float
+    points: tuple[tuple[float, ...], ...] = field(
+        metadata=field_metadata("a list of [x, y] in m, or of [x, y, angle] in m and rad")
+    )
+    motion_time: float = field(metadata=_TIME)
 
     def __post_init__(self) -> None:
         super().__post_init__()
         points = _points(self.points, "points", 2, (2, 3))
         object.__setattr__(self, "points", tuple(map(tuple, points.tolist())))
-        positive(self.motion_time, "motion_time", "seconds")
+        check_numbers(self)
         if np.any(np.linalg.norm(np.diff(points[:, :2], axis=0), axis=1) == 0.0):
             raise InputError("two neighbouring points coincide", field="points", remedy="drop one of them")
 
@@ -319,9 +320,9 @@ class TabulatedPath(CheckedFields):
     _own = ("points",)
     points: tuple[tuple[float, float], ...]
     times: tuple[float, ...] | None = None
-    motion_time: float | None = None
-    max_acceleration: float | None = None
-    max_speed: float | None = None
+    motion_time: float | None = field(default=None, metadata=_TIME)
+    max_acceleration: float | None = field(default=None, metadata=_ALONG)
+    max_speed: float | None = optional(None, "the largest speed along the path in m/s", positive)
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -346,9 +347,7 @@ class TabulatedPath(CheckedFields):
                 field=given[-1] if given else "max_acceleration", value=", ".join(given) or None,
                 remedy=f"drop all but {given[0]}" if given else "give max_acceleration, motion_time, or times",
             )  # fmt: skip
-        for name, unit in (("motion_time", "seconds"), ("max_acceleration", "m/s^2"), ("max_speed", "m/s")):
-            if (value := getattr(self, name)) is not None:
-                positive(value, name, unit)
+        check_numbers(self)
         if self.max_speed is not None and self.max_acceleration is None:
             raise InputError(
                 "a largest speed needs a largest acceleration", field="max_speed", value=self.max_speed,
@@ -498,12 +497,12 @@ class SequencePath(CheckedFields):
         end-effector.
     """
 
-    paths: tuple[Path, ...]
-    dwell: float = 0.0
+    paths: tuple[Path, ...] = field(metadata=field_metadata("names of other [path.NAME] tables, in order"))
+    dwell: float = optional(0.0, "the dwell between two paths in s", not_negative, "seconds")
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        not_negative(self.dwell, "dwell", "seconds")
+        check_numbers(self)
         if len(self.paths) < 2:
             raise InputError("a sequence needs two paths", field="paths", value=len(self.paths), remedy="name them")
         for number, (before, after) in enumerate(pairwise(self.paths), start=2):

@@ -77,20 +77,18 @@ class Actuator(CheckedFields):
         1.0, "the rotor's angle over the joint's, or in rad/m where the joint slides", positive,
         "turns of the rotor per turn of the joint",
     )  # fmt: skip
-    rotor_inertia: float = optional(0.0, "the rotor's moment of inertia in kg m^2", not_negative, "kg m^2")
-    torque_constant: float | None = optional(None, "the torque constant in N m/A", positive, "N m/A")
+    rotor_inertia: float = optional(0.0, "the rotor's moment of inertia in kg m^2", not_negative)
+    torque_constant: float | None = optional(None, "the torque constant in N m/A", positive)
     back_emf: float | None = optional(
-        None, "the back-EMF constant in V s/rad, by default the torque constant", positive, "V s/rad"
+        None, "the back-EMF constant in V s/rad, by default the torque constant", positive
     )
-    resistance: float | None = optional(None, "the resistance of the winding in ohm", positive, "ohm")
-    inductance: float = optional(0.0, "the inductance of the winding in H", not_negative, "H")
-    voltage_limit: float | None = optional(None, "the largest voltage of the amplifier in V", positive, "V")
-    current_limit: float | None = optional(None, "the largest current of the amplifier in A", positive, "A")
-    amplifier: Amplifier = optional(  # noqa: RUF009 - a field
-        Amplifier.CURRENT, 'what the amplifier imposes: "current" or "voltage"'
-    )
+    resistance: float | None = optional(None, "the resistance of the winding in ohm", positive)
+    inductance: float = optional(0.0, "the inductance of the winding in H", not_negative)
+    voltage_limit: float | None = optional(None, "the largest voltage of the amplifier in V", positive)
+    current_limit: float | None = optional(None, "the largest current of the amplifier in A", positive)
+    amplifier: Amplifier = optional(Amplifier.CURRENT, 'what the amplifier imposes: "current" or "voltage"')
     bandwidth: float | None = optional(
-        None, "the bandwidth of the current loop in Hz, by default without lag", positive, "Hz"
+        None, "the bandwidth of the current loop in Hz, by default without lag", positive
     )
 
     def __post_init__(self) -> None:

@@ -22,11 +22,14 @@ from paraflex.fem import (
     mesh_beam,
 )
 from paraflex.mechanism.damping import Damping
-from paraflex.mechanism.modal import DeformableBody, ModalBody
-from paraflex.mechanism.quantities import finite, in_unit, not_negative, positive
+from paraflex.mechanism.modal import DAMPING, MODES, DeformableBody, ModalBody
+from paraflex.mechanism.quantities import field_metadata, finite, not_negative, optional, positive
 from paraflex.mechanism.sections import Section
 
 T = TypeVar("T")
+_LENGTH = field_metadata("the length in m", positive)
+_POINTS = "the distance of each named point from the start in m"
+_LUMPS = "the name of a [lump.NAME] table for each point"
 _ROD = ' (a rod without mass between two pins is a joint of type = "distance")'
 
 
@@ -46,9 +49,9 @@ class Material(CheckedFields):
 
     _table = "material"
 
-    youngs_modulus: float = field(metadata=in_unit(positive, "Pa"))
-    density: float = field(metadata=in_unit(positive, "kg/m^3"))
-    strength: float | None = field(default=None, metadata=in_unit(positive, "Pa"))
+    youngs_modulus: float = field(metadata=field_metadata("Young's modulus in Pa", positive))
+    density: float = field(metadata=field_metadata("the density in kg/m^3", positive))
+    strength: float | None = optional(None, "the largest admissible stress in Pa", positive)
 
 
 class Curvature(Enum):
@@ -88,8 +91,8 @@ class LumpedMass(CheckedFields):
     _table = "lump"
 
     point: str
-    mass: float = field(metadata=in_unit(not_negative, "kg"))
-    inertia: float = field(default=0.0, metadata=in_unit(not_negative, "kg m^2"))
+    mass: float = field(metadata=field_metadata("the mass in kg", not_negative))
+    inertia: float = optional(0.0, "the moment of inertia in kg m^2", not_negative)
 
 
 @dataclass(frozen=True)
@@ -113,10 +116,12 @@ class RigidBody(CheckedFields):
     _table = "body"
 
     name: str
-    mass: float = field(metadata=in_unit(positive, f"kg{_ROD}"))
-    inertia: float = field(metadata=in_unit(positive, f"kg m^2{_ROD}"))
-    centre_of_mass: tuple[float, float] = field(default=(0.0, 0.0), metadata={"check": finite})
-    points: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    mass: float = field(metadata=field_metadata("the mass in kg", positive, f"kg{_ROD}"))
+    inertia: float = field(
+        metadata=field_metadata("the moment of inertia about the centre of mass in kg m^2", positive, f"kg m^2{_ROD}")
+    )
+    centre_of_mass: tuple[float, float] = optional((0.0, 0.0), "[x, y] in the body frame in m", finite)
+    points: Mapping[str, tuple[float, float]] = optional({}, "[x, y] of each named point in the body frame in m")
 
 
 @dataclass(frozen=True)
@@ -161,19 +166,39 @@ class FlexibleBeam(DeformableBody):
     """
 
     name: str
-    length: float
-    section: Section | tuple[Section, ...]
-    material: Material | tuple[Material, ...]
-    points: Mapping[str, float] = field(default_factory=dict)
-    elements: int | tuple[int, ...] | None = None
-    lumps: tuple[LumpedMass, ...] = ()
-    reference: ReferenceCondition = ReferenceCondition.PINNED
-    curvature: Curvature = Curvature.SEPARATE
-    modes: int | None = None
-    damping: Damping | None = None
-    flexible: bool = True
-    frames: int = 1
-    reduction: ComponentModes = ComponentModes.MODAL
+    length: float = field(metadata=_LENGTH)
+    section: Section | tuple[Section, ...] = field(
+        metadata=field_metadata("the name of a [section.NAME] table, or one per span")
+    )
+    material: Material | tuple[Material, ...] = field(
+        metadata=field_metadata("the name of a [material.NAME] table, or one per span")
+    )
+    points: Mapping[str, float] = optional({}, _POINTS)
+    elements: int | tuple[int, ...] | None = optional(
+        None,
+        "elements per span, one number or one per span; by default 1, and where a joint slides along the beam enough "
+        "that none is longer than a third of it",
+    )
+    lumps: tuple[LumpedMass, ...] = optional((), _LUMPS)
+    reference: ReferenceCondition = optional(
+        ReferenceCondition.PINNED,
+        'how its frame is fixed to the beam: "pinned", "cantilever" or "free"; the model\'s by default',
+    )
+    curvature: Curvature = optional(
+        Curvature.SEPARATE,
+        'curvature at lumped moments of inertia: "separate" or "shared"; the model\'s by default',
+    )
+    modes: int | None = optional(None, MODES)
+    damping: Damping | None = optional(None, DAMPING)
+    flexible: bool = optional(True, "false for a rigid beam")
+    frames: int = optional(
+        1, "the number of floating frames of equal length, joined rigidly: more for large deflections"
+    )
+    reduction: ComponentModes = optional(
+        ComponentModes.MODAL,
+        'the reduction basis with modes: "modal", modes in its frame; "craig-bampton", modes with its joints held, '
+        "and static shapes of these",
+    )
 
     @cached_property
     def mesh(self) -> BeamMesh:
@@ -272,16 +297,16 @@ class AssumedModesBeam(DeformableBody):
     """
 
     name: str
-    length: float
-    section: Section
-    material: Material
+    length: float = field(metadata=_LENGTH)
+    section: Section = field(metadata=field_metadata("the name of a [section.NAME] table"))
+    material: Material = field(metadata=field_metadata("the name of a [material.NAME] table"))
     transverse: tuple[ShapeFunction, ...] = ()
     axial: tuple[ShapeFunction, ...] = ()
-    points: Mapping[str, float] = field(default_factory=dict)
-    lumps: tuple[LumpedMass, ...] = ()
-    modes: int | None = None
-    damping: Damping | None = None
-    flexible: bool = True
+    points: Mapping[str, float] = optional({}, _POINTS)
+    lumps: tuple[LumpedMass, ...] = optional((), _LUMPS)
+    modes: int | None = optional(None, MODES)
+    damping: Damping | None = optional(None, DAMPING)
+    flexible: bool = optional(True, "false for a rigid bar")
 
     @property
     def shapes(self) -> AssumedShapes:
@@ -307,6 +332,10 @@ class AssumedModesBeam(DeformableBody):
 
 
 Body = RigidBody | FlexibleBeam | AssumedModesBeam | ModalBody
+# Kinds of bodies by their names in files.
+BODY_KINDS: dict[str, type[Body]] = {
+    "beam": FlexibleBeam, "rigid": RigidBody, "assumed-modes": AssumedModesBeam, "modal": ModalBody
+}  # fmt: skip
 named_in_errors("a body")(Body)
 
 

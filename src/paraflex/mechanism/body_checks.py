@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from contextlib import contextmanager
 from typing import TypeVar
 
-from paraflex.errors import InputError, suggestion
+from paraflex.errors import InputError, within
 from paraflex.fem import Polynomial, mesh_beam
 from paraflex.limits import ELEMENTS
 from paraflex.mechanism.bodies import AssumedModesBeam, Body, ComponentModes, FlexibleBeam, RigidBody
-from paraflex.mechanism.damping import Damping, stiffness_damping
+from paraflex.mechanism.damping import stiffness_damping
 from paraflex.mechanism.modal import ModalBody
-from paraflex.mechanism.quantities import check_numbers, finite, positive
+from paraflex.mechanism.quantities import check_numbers, finite, known
 
 T = TypeVar("T")
 
@@ -26,14 +25,13 @@ def check_body(body: Body) -> None:
         The first check that fails.
     """
     field = f"body.{body.name}"
+    check_numbers(body, field)
     if isinstance(body, RigidBody):
-        check_numbers(body, field)
         for name, position in body.points.items():
             finite(position, f"{field}.points.{name}")
         return
     if isinstance(body, ModalBody):
-        check_numbers(body, field)
-        with _within(field):
+        with within(field):
             _ = body.integrals
             for name in body.points:
                 body.point(name)
@@ -44,10 +42,11 @@ def check_body(body: Body) -> None:
         n = body.n_flexible
     else:
         _check_bar(body, field)
-        with _within(field):
+        with within(field):
             n = body.mesh.n_flexible
         _check_frames(body, field)
-    check_damping(body.damping, f"{field}.damping")
+    if body.damping is not None:
+        check_numbers(body.damping, f"{field}.damping")
     static = isinstance(body, FlexibleBeam) and body.reduction is ComponentModes.CRAIG_BAMPTON
     if static and body.modes is None:
         raise InputError(
@@ -78,33 +77,16 @@ def _check_frames(beam: FlexibleBeam, field: str) -> None:
     stiffness_damping(beam.damping, "a beam in several frames", f"{field}.damping")
 
 
-def check_damping(damping: Damping | None, field: str) -> None:
-    """Check that damping is of a known kind and that its coefficients are valid, above all not negative."""
-    if damping is not None and not isinstance(damping, Damping):
-        raise InputError(
-            "not a damping", field=field, value=damping, remedy="give RayleighDamping or ModalDamping, or leave it out"
-        )
-    if damping is not None:
-        check_numbers(damping, field)
-
-
 def _check_bar(body: FlexibleBeam | AssumedModesBeam, field: str) -> None:
-    positive(body.length, f"{field}.length", "m")
     for where, section in _each(body.section, f"{field}.section"):
         check_numbers(section, where)
     for where, material in _each(body.material, f"{field}.material"):
         check_numbers(material, where)
     finite(body.points.values(), f"{field}.points")
-    with _within(field):
+    with within(field):
         mesh_beam(body.length, body.points, body.counts if isinstance(body, FlexibleBeam) else 1)
     for lump in body.lumps:
-        if lump.point not in body.points:
-            raise InputError(
-                "a lumped mass at an unknown point",
-                field=f"{field}.lumps",
-                value=lump.point,
-                remedy=suggestion(lump.point, body.points),
-            )
+        known(lump.point, body.points, f"{field}.lumps", "point", "a lumped mass at an unknown point")
         check_numbers(lump, f"{field}.lumps.{lump.point}")
 
 
@@ -123,14 +105,5 @@ def _check_shapes(body: AssumedModesBeam, field: str) -> None:
                 if not function.coefficients:
                     raise InputError("has no coefficients", field=f"{field}.{kind}", remedy="give at least one")
                 finite(function.coefficients, f"{field}.{kind}")
-    with _within(field):
+    with within(field):
         _ = body.integrals
-
-
-@contextmanager
-def _within(field: str) -> Iterator[None]:
-    """Add the body to the field that an error names."""
-    try:
-        yield
-    except InputError as error:
-        raise error.within(field) from error

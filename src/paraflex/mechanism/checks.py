@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping
 from typing import Any
 
 from paraflex.errors import InputError, suggestion
 from paraflex.mechanism.bodies import FlexibleBeam
 from paraflex.mechanism.body_checks import check_body
 from paraflex.mechanism.groups import Group, grouped, groups_of
-from paraflex.mechanism.joints import GROUND, Joint, PointRef, points_named
+from paraflex.mechanism.joints import GROUND, PointRef, points_named
 from paraflex.mechanism.members import Assembly, Members
 from paraflex.mechanism.poses import approximate_poses, placed_poses
 from paraflex.mechanism.quantities import check_numbers, finite, joints_named, known
@@ -77,20 +76,19 @@ def check_joints(mechanism: Members) -> None:
 
 def check_members_at_joints(mechanism: Members) -> None:
     """Check that members at joints refer to joints with the required motion, and actuation modes to motors."""
-    joints = {joint.name: joint for joint in mechanism.joints}
     for group, members in grouped(mechanism):
         for member in members:
-            _check_joints_of(member, group, joints)
+            _check_joints_of(mechanism, member, group)
     motors = [motor.name for motor in mechanism.motors]
     for mode in mechanism.modes:
         for name in mode.motors:
             known(name, motors, f"mode.{mode.name}", "motor")
 
 
-def _check_joints_of(member: Any, group: Group, joints: Mapping[str, Joint]) -> None:
+def _check_joints_of(mechanism: Members, member: Any, group: Group) -> None:
     for name, joint, does in joints_named(member):
-        known(joint, joints, field := f"{group.table}.{member.name}.{name}", "joint")
-        joints[joint].check_moves(field, does)
+        known(joint, mechanism.joints_by_name, field := f"{group.table}.{member.name}.{name}", "joint")
+        mechanism.joints_by_name[joint].check_moves(field, does)
 
 
 def check_relations(mechanism: Members) -> None:
@@ -183,7 +181,7 @@ def check_sensor(mechanism: Members, sensor: Sensor) -> None:
         One of them does not exist or is not of the required kind.
     """
     group = groups_of(type(mechanism))["sensors"]
-    _check_joints_of(sensor, group, {joint.name: joint for joint in mechanism.joints})
+    _check_joints_of(mechanism, sensor, group)
     _check_points_of(mechanism, group, sensor)
     _check_measured(mechanism, sensor)
 
@@ -197,7 +195,7 @@ def _check_measured(mechanism: Members, sensor: Sensor) -> None:
     if location.point is not None:
         known_point(mechanism, location.point, f"{field}.location.point")
     elif location.at is None:
-        known(location.joint, {joint.name: joint for joint in mechanism.joints}, f"{field}.location.joint", "joint")
+        known(location.joint, mechanism.joints_by_name, f"{field}.location.joint", "joint")
 
 
 def _two_bodies(mechanism: Members, a: PointRef, b: PointRef, field: str, what: str, remedy: str) -> None:

@@ -9,7 +9,7 @@ import numpy as np
 from paraflex.arguments import CheckedFields, named_in_errors
 from paraflex.arrays import Array
 from paraflex.errors import InputError
-from paraflex.mechanism.quantities import in_unit, not_negative, positive
+from paraflex.mechanism.quantities import field_metadata, not_negative, optional, positive
 
 
 @dataclass(frozen=True)
@@ -29,8 +29,8 @@ class RayleighDamping(CheckedFields):
 
     _table = "damping"
 
-    mass: float = field(default=0.0, metadata=in_unit(not_negative, "1/s"))
-    stiffness: float = field(default=0.0, metadata=in_unit(not_negative, "s"))
+    mass: float = optional(0.0, "the mass-proportional coefficient in 1/s, of the body as it is held", not_negative)
+    stiffness: float = optional(0.0, "the stiffness-proportional coefficient in s", not_negative)
 
     def coefficients(self, omega: Array) -> Array:
         """Return damping coefficients [1/s] of mass-normalised modes by frequency [rad/s], the body's joints held."""
@@ -59,7 +59,12 @@ class ModalDamping(CheckedFields):
 
     _table = "damping"
 
-    ratios: tuple[float, ...] = field(metadata={"check": _check_ratios})
+    ratios: tuple[float, ...] = field(
+        metadata=field_metadata(
+            "the damping ratio of each mode of the body as its joints hold it; the last applies to all others",
+            _check_ratios,
+        )
+    )
 
     def coefficients(self, omega: Array) -> Array:
         """Return the damping coefficient 2 ratio omega of each mode [1/s]."""
@@ -84,8 +89,16 @@ class LossFactor(CheckedFields):
 
     _table = "damping"
 
-    loss_factor: float = field(metadata=in_unit(not_negative, "a number, twice the damping ratio, say 0.01"))
-    frequency: float = field(metadata=in_unit(positive, "Hz"))
+    loss_factor: float = field(
+        metadata=field_metadata(
+            "twice the damping ratio at the frequency, of stiffness-proportional damping",
+            not_negative,
+            "a number, twice the damping ratio, say 0.01",
+        )
+    )
+    frequency: float = field(
+        metadata=field_metadata("the frequency in Hz at which the loss factor holds", positive, "Hz")
+    )
 
     @property
     def stiffness(self) -> float:

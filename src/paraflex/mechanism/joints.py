@@ -13,7 +13,7 @@ from enum import Enum
 from typing import Any, ClassVar
 
 from paraflex.arguments import CheckedFields, checked_arguments, named_in_errors
-from paraflex.errors import InputError
+from paraflex.errors import InputError, within
 from paraflex.mechanism.profiles import TimeProfile, check_motion
 from paraflex.mechanism.quantities import AT_JOINT, JointThat, field_metadata, finite, optional, positive
 
@@ -184,7 +184,7 @@ class RevoluteJoint(Joint, kind="revolute", holds=("points",)):
 
 
 _DIRECTION = field_metadata("the angle of its axis against the first body in rad", finite)
-_LENGTH = field_metadata("the constant distance in m, by default that of the first assembly", positive, "m")
+_LENGTH = field_metadata("the constant distance in m, by default that of the first assembly", positive)
 _ANGLE = field_metadata("the angle of the second body against the first in rad", finite)
 
 
@@ -230,7 +230,7 @@ class SlidingJoint(Joint, kind="sliding", holds=("axis",), symbol="sliding", fol
         Action of a run when point b reaches an end of the beam; an error by default.
     """
 
-    at_end: AtEnd = optional(  # noqa: RUF009 - a field
+    at_end: AtEnd = optional(
         AtEnd.ERROR, 'where a sliding point comes to the end of its beam: "error", "stop", "warn" or "ignore"'
     )
 
@@ -269,10 +269,8 @@ class PrescribedAngle(CheckedFields):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        try:
+        with within(f"prescribed.{self.name}"):
             check_motion(self.profile)
-        except InputError as error:
-            raise error.within(f"prescribed.{self.name}") from None
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,7 @@ import numpy as np
 
 from paraflex.arguments import CheckedFields, named_in_errors
 from paraflex.arrays import Array
-from paraflex.errors import InputError
+from paraflex.errors import within
 from paraflex.mechanism.joints import PointRef
 from paraflex.mechanism.profiles import TimeProfile, marks
 from paraflex.mechanism.quantities import AT_JOINT, field_metadata, finite, not_negative, optional, positive
@@ -100,9 +100,9 @@ class LinearSpring(CheckedFields):
     name: str
     a: PointRef
     b: PointRef
-    stiffness: float = field(metadata=field_metadata("the stiffness in N/m", not_negative, "N/m"))
-    length: float = optional(0.0, "the free length in m", not_negative, "m")
-    damping: float = optional(0.0, "the damping in N s/m", not_negative, "N s/m")
+    stiffness: float = field(metadata=field_metadata("the stiffness in N/m", not_negative))
+    length: float = optional(0.0, "the free length in m", not_negative)
+    damping: float = optional(0.0, "the damping in N s/m", not_negative)
 
 
 InTime = float | TimeProfile
@@ -154,10 +154,8 @@ class _Load(CheckedFields):
         InputError
             A profile does not cover a time or is not finite there.
         """
-        try:
+        with within(f"load.{self.name}"):
             each = [value_in_time(one, t) for one in self.components]
-        except InputError as error:
-            raise error.within(f"load.{self.name}") from None
         return np.stack(each, axis=1)
 
     def largest(self, t: Array) -> float:
@@ -173,7 +171,11 @@ class PointForce(_Load):
     kind: ClassVar[str] = "force"
     unit: ClassVar[str] = "N"
 
-    force: tuple[InTime, InTime] = field(metadata=field_metadata("[x, y] in the ground frame in N", _finite_or_profile))
+    force: tuple[InTime, InTime] = field(
+        metadata=field_metadata(
+            "[x, y] in the ground frame in N, numbers or expressions of the time t", _finite_or_profile
+        )
+    )
 
 
 @dataclass(frozen=True)
@@ -183,7 +185,9 @@ class AppliedTorque(_Load):
     kind: ClassVar[str] = "torque"
     unit: ClassVar[str] = "N m"
 
-    torque: InTime = field(metadata=field_metadata("the torque in N m", _finite_or_profile))
+    torque: InTime = field(
+        metadata=field_metadata("the torque in N m, numbers or expressions of the time t", _finite_or_profile)
+    )
 
 
 Load = PointForce | AppliedTorque

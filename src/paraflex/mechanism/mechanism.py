@@ -95,7 +95,7 @@ class Mechanism(Members, Shown):
         self.__dict__.pop("_bodies_by_name", None)
         for field, members in with_phases(self).items():
             object.__setattr__(self, field, members)
-        self.__dict__.pop("_joints_by_name", None)
+        self.__dict__.pop("joints_by_name", None)
 
     def save(self, path: str | Path) -> None:
         """Write the model file of this mechanism, from which `load` reads an equal mechanism; see `Model.save`."""

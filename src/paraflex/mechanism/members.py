@@ -26,7 +26,7 @@ from paraflex.mechanism.loads import (
     TorsionalSpring,
 )
 from paraflex.mechanism.payload import Payload
-from paraflex.mechanism.quantities import joints_named, known
+from paraflex.mechanism.quantities import field_metadata, joints_named, known, optional
 from paraflex.mechanism.sensors import SENSOR_KINDS, Sensor
 
 TASK_COORDINATES = ("x", "y", "angle")
@@ -39,8 +39,8 @@ class EndEffector(CheckedFields):
     _table = "end_effector"
 
     _own = ("coordinates",)
-    point: PointRef
-    coordinates: tuple[str, ...] = ("x", "y")
+    point: PointRef = field(metadata=field_metadata('"body.point"'))
+    coordinates: tuple[str, ...] = optional(("x", "y"), 'task coordinates from "x", "y", "angle"')
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -169,15 +169,16 @@ class Members(CheckedFields):
 
     def joint(self, name: str) -> Joint:
         """Return the joint of a name; raise an `InputError` if there is none."""
-        known(name, self._joints_by_name, "joint", "joint")
-        return self._joints_by_name[name]
+        known(name, self.joints_by_name, "joint", "joint")
+        return self.joints_by_name[name]
 
     @cached_property
     def _bodies_by_name(self) -> dict[str, Body]:
         return {body.name: body for body in self.bodies}
 
     @cached_property
-    def _joints_by_name(self) -> dict[str, Joint]:
+    def joints_by_name(self) -> dict[str, Joint]:
+        """Joints by name."""
         return {joint.name: joint for joint in self.joints}
 
     @property

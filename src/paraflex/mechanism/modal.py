@@ -13,7 +13,7 @@ from paraflex.errors import InputError
 from paraflex.fem import ShapeIntegrals
 from paraflex.fem.eigen import is_definite
 from paraflex.mechanism.damping import Damping
-from paraflex.mechanism.quantities import in_unit, positive
+from paraflex.mechanism.quantities import field_metadata, optional, positive
 
 Row = Sequence[float]
 Matrix = Sequence[Sequence[float]]
@@ -22,6 +22,8 @@ Matrix = Sequence[Sequence[float]]
 _ASYMMETRY = 1e-6
 # Smallest positive eigenvalue of a matrix scaled to a unit diagonal; smaller ones are regarded as zero.
 _SMALLEST_EIGENVALUE = 1e-12
+# Descriptions of fields that all deformable bodies have.
+MODES, DAMPING = "the number of modes of lowest frequency to keep", "a damping table"
 
 
 @dataclass(frozen=True)
@@ -41,9 +43,9 @@ class ModalPoint(CheckedFields):
     _table = "point"
 
     _own = ("position", "shape", "slope")
-    position: Row
-    shape: Matrix
-    slope: Row
+    position: Row = field(metadata=field_metadata("[x, y] in the body frame in m"))
+    shape: Matrix = field(metadata=field_metadata("two rows, displacement along x and y per flexible coordinate"))
+    slope: Row = field(metadata=field_metadata("the rotation per flexible coordinate"))
 
     def __post_init__(self) -> None:
         super().__post_init__()
@@ -104,20 +106,22 @@ class ModalBody(DeformableBody):
 
     _own = ("first_moment", "mass_matrix", "stiffness", "S2", "I1", "G1", "G2", "I2")
     name: str
-    mass: float = field(metadata=in_unit(positive, "kg"))
-    first_moment: Row
-    inertia: float = field(metadata=in_unit(positive, "kg m^2"))
-    mass_matrix: Matrix
-    stiffness: Matrix
-    S2: Matrix
-    I1: Row
-    G1: Row
-    G2: Matrix
-    I2: Matrix | None = None
-    points: Mapping[str, ModalPoint] = field(default_factory=dict)
-    modes: int | None = None
-    damping: Damping | None = None
-    flexible: bool = True
+    mass: float = field(metadata=field_metadata("the mass in kg", positive))
+    first_moment: Row = field(metadata=field_metadata("[x, y], mass times the centre of mass in kg m"))
+    inertia: float = field(
+        metadata=field_metadata("the moment of inertia about the body frame's origin in kg m^2", positive)
+    )
+    mass_matrix: Matrix = field(metadata=field_metadata("rows of the mass matrix of the flexible coordinates"))
+    stiffness: Matrix = field(metadata=field_metadata("rows of the stiffness matrix"))
+    S2: Matrix = field(metadata=field_metadata("two rows, int N dm"))
+    I1: Row = field(metadata=field_metadata("int s0^T N dm"))
+    G1: Row = field(metadata=field_metadata("int (x N_y - y N_x) dm"))
+    G2: Matrix = field(metadata=field_metadata("rows of the skew int (N_x^T N_y - N_y^T N_x) dm"))
+    I2: Matrix | None = optional(None, "rows of int N^T N dm")
+    points: Mapping[str, ModalPoint] = optional({}, "position, shape and slope of each named point")
+    modes: int | None = optional(None, MODES)
+    damping: Damping | None = optional(None, DAMPING)
+    flexible: bool = optional(True, "false for a rigid body")
 
     def __post_init__(self) -> None:
         super().__post_init__()

@@ -12,7 +12,7 @@ from paraflex.arguments import CheckedFields, with_fields
 from paraflex.errors import InputError
 from paraflex.mechanism.bodies import Body, LumpedMass, RigidBody
 from paraflex.mechanism.modal import ModalBody
-from paraflex.mechanism.quantities import check_numbers, finite, in_unit, not_negative
+from paraflex.mechanism.quantities import check_numbers, field_metadata, finite, not_negative, optional
 
 
 @dataclass(frozen=True)
@@ -31,9 +31,13 @@ class Payload(CheckedFields):
 
     _table = "payload"
 
-    mass: float = field(metadata=in_unit(not_negative, "kg"))
-    inertia: float = field(default=0.0, metadata=in_unit(not_negative, "kg m^2"))
-    offset: tuple[float, float] = field(default=(0.0, 0.0), metadata={"check": finite})
+    mass: float = field(metadata=field_metadata("the mass in kg", not_negative))
+    inertia: float = optional(0.0, "the moment of inertia about its centre of mass in kg m^2", not_negative)
+    offset: tuple[float, float] = optional(
+        (0.0, 0.0),
+        "[x, y] in m from the end-effector's point to its centre of mass, in the frame of the body that carries it",
+        finite,
+    )
 
     def __post_init__(self) -> None:
         super().__post_init__()

@@ -15,10 +15,10 @@ from paraflex.limits import of_size, possible
 JointThat = Literal["moves", "turns", "slides", "exists"]
 
 
-def known(name: str, names: Collection[str], field: str, kind: str) -> None:
-    """Raise an `InputError` that suggests the nearest name, unless a name is known."""
+def known(name: str, names: Collection[str], field: str, kind: str, problem: str = "") -> None:
+    """Raise an `InputError` that suggests the nearest name, unless a name is known; by default "unknown `kind`"."""
     if not isinstance(name, str) or name not in names:
-        raise InputError(f"unknown {kind}", field=field, value=name, remedy=suggestion(name, names))
+        raise InputError(problem or f"unknown {kind}", field=field, value=name, remedy=suggestion(name, names))
 
 
 def all_known(given: Iterable[str], names: Collection[str], field: str, kind: str) -> None:
@@ -68,33 +68,30 @@ def field_metadata(
     check : callable, optional
         Check of a value that is not None: `finite`, or `positive`, `not_negative` or `not_zero`, which need a unit.
     unit : str
-        Unit that the remedy of the check's error asks for; by default the check takes none.
+        Unit that the remedy of the check's error asks for, by default the last in the description.
     joint : "moves", "turns", "slides" or "exists", optional
         Motion required of a joint, if the field is the name of one.
     """
-    checked = partial(check, unit=unit) if check is not None and unit else check
-    return {"description": description, "check": checked, "joint": joint}
+    if check is not None and check in (positive, not_negative, not_zero):
+        check = partial(check, unit=unit or description.rpartition(" in ")[2].partition(",")[0])
+    return {"description": description, "check": check, "joint": joint}
 
 
 def optional(default: Any, description: str, check: Callable[..., None] | None = None, unit: str = "") -> Any:
     """Return a dataclass field with a default value and with the metadata of the other arguments."""
-    return field(default=default, metadata=field_metadata(description, check, unit))
-
-
-def in_unit(check: Callable[..., None], unit: str) -> dict[str, Any]:
-    """Return the metadata of a number with a check and the unit that its error asks for."""
-    return {"check": partial(check, unit=unit)}
+    value: Any = {"default_factory": dict} if default == {} else {"default": default}
+    return field(**value, metadata=field_metadata(description, check, unit))
 
 
 AT_JOINT = field_metadata("the name of a joint", joint="moves")
 
 
-def check_numbers(member: Any, place: str) -> None:
-    """Check the numbers of a member by the metadata of their fields."""
+def check_numbers(member: Any, place: str = "") -> None:
+    """Check the numbers of a member at a place of a file by the metadata of their fields."""
     for each in fields(member):
         check, value = each.metadata.get("check"), getattr(member, each.name)
         if check is not None and value is not None:
-            check(value, f"{place}.{each.name}")
+            check(value, f"{place}.{each.name}".lstrip("."))
 
 
 def joints_named(member: Any) -> Iterator[tuple[str, str, JointThat]]:

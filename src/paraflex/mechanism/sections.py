@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import math
 from abc import ABC, abstractmethod
-from dataclasses import dataclass, field, fields
+from dataclasses import dataclass, field
 from typing import ClassVar
 
 from paraflex.arguments import CheckedFields, checked_arguments, named_in_errors
 from paraflex.errors import InputError
-from paraflex.mechanism.quantities import in_unit, positive
+from paraflex.mechanism.quantities import check_numbers, field_metadata, optional, positive
+
+_WALL = field_metadata("the thickness of the wall of a hollow section in m", positive)
 
 
 @named_in_errors("a shape", "Rectangle(...), Round(...) or Tube(...)")
@@ -22,10 +24,7 @@ class Shape(CheckedFields, ABC):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        for each in fields(self):
-            value = getattr(self, each.name)
-            if value is not None:
-                positive(value, f"section.{each.name}", "m")
+        check_numbers(self, self._table)
         wall = getattr(self, "wall", None)
         if wall is not None and not wall < self.smallest / 2.0:
             raise InputError(
@@ -60,9 +59,9 @@ class Rectangle(Shape):
 
     kind: ClassVar[str] = "rectangle"
 
-    width: float
-    thickness: float
-    wall: float | None = None
+    width: float = field(metadata=field_metadata("the width out of the plane of motion in m", positive))
+    thickness: float = field(metadata=field_metadata("the thickness in the plane of motion in m", positive))
+    wall: float | None = field(default=None, metadata=_WALL)
 
     @property
     def smallest(self) -> float:
@@ -97,7 +96,7 @@ class Round(Shape):
 
     kind: ClassVar[str] = "round"
 
-    diameter: float
+    diameter: float = field(metadata=field_metadata("the outer diameter in m", positive))
 
     @property
     def smallest(self) -> float:
@@ -126,7 +125,7 @@ class Tube(Round):
 
     kind: ClassVar[str] = "tube"
 
-    wall: float
+    wall: float = field(metadata=_WALL)
 
     @property
     def area(self) -> float:
@@ -162,10 +161,12 @@ class Section(CheckedFields):
 
     _table = "section"
 
-    area: float = field(metadata=in_unit(positive, "m^2"))
-    second_moment: float = field(metadata=in_unit(positive, "m^4"))
+    area: float = field(metadata=field_metadata("the area in m^2", positive))
+    second_moment: float = field(metadata=field_metadata("the second moment of area in m^4", positive))
     shape: Shape | None = None
-    outer_fibre: float | None = field(default=None, metadata=in_unit(positive, "m"))
+    outer_fibre: float | None = optional(
+        None, "the distance of the outermost fibre from the neutral axis in m", positive
+    )
 
     @classmethod
     def of(cls, shape: Shape) -> Section:

@@ -9,7 +9,7 @@ from math import ceil
 from typing import Any, TypeVar
 
 from paraflex.arguments import checked_arguments
-from paraflex.errors import InputError, suggestion
+from paraflex.errors import InputError
 from paraflex.fem import SpanProperties
 from paraflex.limits import SEGMENTS, at_most
 from paraflex.mechanism.bodies import Body, FlexibleBeam, RigidBody, given_shapes
@@ -21,6 +21,7 @@ from paraflex.mechanism.loads import TorsionalDamper, TorsionalSpring
 from paraflex.mechanism.mechanism import Mechanism
 from paraflex.mechanism.members import Assembly
 from paraflex.mechanism.poses import approximate_poses
+from paraflex.mechanism.quantities import known
 
 T = TypeVar("T")
 
@@ -115,7 +116,9 @@ def finite_segments(mechanism: Mechanism, segments: int | Mapping[str, int] = 8)
         for i, (a, b) in enumerate(pairwise(names)):
             hinge = f"{a}-{b}"
             joints.append(RevoluteJoint(hinge, PointRef(a, LAST_END), PointRef(b, FIRST_END)))
-            stiffness = _stiffness(body, (i + 0.5) * length, (i + 1.5) * length)
+            # The bending between the centres of the segments, pieces in series.
+            pieces = _pieces(body, (i + 0.5) * length, (i + 1.5) * length)
+            stiffness = 1.0 / sum((end - start) / span.bending_stiffness for start, end, span in pieces)
             springs.append(TorsionalSpring(hinge, hinge, stiffness))
             if lag:
                 dampers.append(TorsionalDamper(hinge, hinge, lag * stiffness))
@@ -192,8 +195,7 @@ def _assembly(mechanism: Mechanism, assembly: Assembly, carriers: Mapping[str, t
 def _counts(names: list[str], segments: int | Mapping[str, int]) -> dict[str, int]:
     counts = dict.fromkeys(names, segments) if isinstance(segments, int) else dict(segments)
     for name, count in counts.items():
-        if name not in names:
-            raise InputError("no flexible beam", field="segments", value=name, remedy=suggestion(name, names))
+        known(name, names, "segments", "beam", "no flexible beam")
         if count < 1:
             raise InputError("a beam needs at least one segment", field=f"segments.{name}", value=count, remedy="say 8")
         at_most(count, SEGMENTS, f"segments.{name}")
@@ -215,11 +217,6 @@ def _pieces(beam: FlexibleBeam, start: float, end: float) -> list[tuple[float, f
         if min(b, end) > max(a, start):
             pieces.append((max(a, start), min(b, end), span))
     return pieces
-
-
-def _stiffness(beam: FlexibleBeam, start: float, end: float) -> float:
-    """Return the stiffness of a spring for the bending between two positions: pieces in series [N m/rad]."""
-    return 1.0 / sum((b - a) / span.bending_stiffness for a, b, span in _pieces(beam, start, end))
 
 
 def _segment(beam: FlexibleBeam, name: str, i: int, length: float, owners: Mapping[str, int]) -> RigidBody:

@@ -13,7 +13,7 @@ import numpy as np
 
 from paraflex.arguments import CheckedFields, named_in_errors
 from paraflex.arrays import Numbers
-from paraflex.errors import InputError, suggestion
+from paraflex.errors import InputError
 from paraflex.limits import of_size
 from paraflex.mechanism.bodies import AssumedModesBeam, Body, FlexibleBeam
 from paraflex.mechanism.joints import GROUND, Joint, PointRef
@@ -243,14 +243,10 @@ class Sensor(CheckedFields, ABC):
 
 
 @dataclass(frozen=True)
-class Encoder(Sensor, kind="encoder", units=("rad", "m")):
-    """Angle [rad] or travel [m] of a joint: second body relative to the first, slopes of beams included."""
+class _JointSensor(Sensor):
+    """Motion of a joint: the base class of encoders and tachometers."""
 
     joint: str = field(metadata=AT_JOINT)
-
-    def read(self, moving: SensorInputs) -> Numbers:
-        """See `Sensor.read`."""
-        return moving.coordinate(self.joint)
 
     @property
     def location(self) -> Location:
@@ -259,19 +255,21 @@ class Encoder(Sensor, kind="encoder", units=("rad", "m")):
 
 
 @dataclass(frozen=True)
-class Tachometer(Sensor, kind="tachometer", units=("rad/s", "m/s")):
-    """Rate of a joint's angle [rad/s] or travel [m/s], slopes of beams included."""
+class Encoder(_JointSensor, kind="encoder", units=("rad", "m")):
+    """Angle [rad] or travel [m] of a joint: second body relative to the first, slopes of beams included."""
 
-    joint: str = field(metadata=AT_JOINT)
+    def read(self, moving: SensorInputs) -> Numbers:
+        """See `Sensor.read`."""
+        return moving.coordinate(self.joint)
+
+
+@dataclass(frozen=True)
+class Tachometer(_JointSensor, kind="tachometer", units=("rad/s", "m/s")):
+    """Rate of a joint's angle [rad/s] or travel [m/s], slopes of beams included."""
 
     def read(self, moving: SensorInputs) -> Numbers:
         """See `Sensor.read`."""
         return moving.rate(self.joint)
-
-    @property
-    def location(self) -> Location:
-        """See `Sensor.location`."""
-        return Location(joint=self.joint, axis="own")
 
 
 @dataclass(frozen=True)
@@ -394,13 +392,9 @@ class StrainGauge(Sensor, kind="strain", units=("1",), rigid=False):
     def check(self, mechanism: SensedMembers, field: str) -> None:
         """See `Sensor.check`."""
         known(self.body, mechanism.points, f"{field}.body", "body")
-        beam = None if self.body == GROUND else mechanism.body(self.body)
-        if not isinstance(beam, FlexibleBeam | AssumedModesBeam):
-            beams = [body.name for body in mechanism.bodies if isinstance(body, FlexibleBeam | AssumedModesBeam)]
-            raise InputError(
-                "strain is measured on beams", field=f"{field}.body", value=self.body,
-                remedy=suggestion(self.body, beams),
-            )  # fmt: skip
+        beams = {body.name: body for body in mechanism.bodies if isinstance(body, FlexibleBeam | AssumedModesBeam)}
+        known(self.body, beams, f"{field}.body", "beam", "strain is measured on beams")
+        beam = beams[self.body]
         if isinstance(self.at, str):
             known(self.at, beam.points, f"{field}.at", "point of the beam")
         else:

@@ -13,7 +13,7 @@ from paraflex.mechanism.mechanism import Mechanism
 from paraflex.mechanism.phases import joint_value
 from paraflex.mechanism.poses import Pose, approximate_poses, placed_poses
 from paraflex.mechanism.profiles import ConstantSpeed, TimeProfile
-from paraflex.mechanism.quantities import known
+from paraflex.mechanism.quantities import known, optional
 
 
 @dataclass(frozen=True)
@@ -32,9 +32,9 @@ class Deflection(CheckedFields):
 
     _table = "deflection"
 
-    axial: float | None = None
-    transverse: float | None = None
-    slope: float | None = None
+    axial: float | None = optional(None, "the displacement along the beam in m")
+    transverse: float | None = optional(None, "the displacement across the beam in m")
+    slope: float | None = optional(None, "the slope in rad")
 
 
 @dataclass(frozen=True)

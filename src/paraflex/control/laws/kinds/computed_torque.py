@@ -54,7 +54,7 @@ class ComputedTorque(Law, kind="computed-torque", title="computed torque"):
     whole_torque: ClassVar[bool] = True
     absolute: ClassVar[bool] = True
 
-    frequency: float = given("the natural frequency of the end-effector's error in Hz", positive, "Hz")
+    frequency: float = given("the natural frequency of the end-effector's error in Hz", positive)
     damping_ratio: float = given(
         "the damping ratio of the end-effector's error", positive, "parts of the critical one", default=0.7
     )
