@@ -9,5 +9,6 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
+Indices = NDArray[np.int64]
 # Real, or complex where a complex step carries a derivative.
 Numbers = NDArray[Any]

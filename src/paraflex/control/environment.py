@@ -11,10 +11,9 @@ from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from paraflex.arguments import checked_arguments
-from paraflex.arrays import Array
+from paraflex.arrays import Array, Numbers
 from paraflex.control.loop.simulation import Simulation
 from paraflex.control.loop.together import by_name, checked_number, periods_in
 from paraflex.control.observations import WIDEST, Observer, observed_sensors
@@ -50,7 +49,7 @@ REGISTERED: dict[str, tuple[str, dict[str, Any]]] = {
 }
 
 
-class Environment(Env[Array, NDArray[Any]]):
+class Environment(Env[Array, Numbers]):
     """Gymnasium environment of a mechanism, with motor torques as actions.
 
     An action a (motors,) applies the torques a x `limits` for one period, in addition to those of the plan if there is
@@ -219,7 +218,7 @@ class Environment(Env[Array, NDArray[Any]]):
         self._seen = self._observe(0, readings, self.np_random)
         return self._seen.copy(), self._info(np.zeros(len(self.motors)))
 
-    def step(self, action: NDArray[Any]) -> tuple[Array, float, bool, bool, dict[str, Any]]:
+    def step(self, action: Numbers) -> tuple[Array, float, bool, bool, dict[str, Any]]:
         """Apply torques for one period; return observation, reward, terminated, truncated and `info`.
 
         `info` contains the "time" reached [s], the "torques" of the action [N m, N], with a plan the "deviation" of the

@@ -6,9 +6,8 @@ from typing import NamedTuple
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
-from paraflex.arrays import Array
+from paraflex.arrays import Array, Indices
 from paraflex.errors import InputError
 from paraflex.linear.zeros import StateSpace
 
@@ -88,7 +87,7 @@ def balanced(system: StateSpace, count: int, low: float) -> BalancedProjection:
     )
 
 
-def _uncoupled(A: Array, low: float) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def _uncoupled(A: Array, low: float) -> tuple[Indices, Indices]:
     """Return the states of undamped motions that are not coupled to other states, and all other states.
 
     Rigid motions are thus retained without a transformation, whose rounding errors would be visible at low frequencies,

@@ -9,11 +9,11 @@ from typing import Any
 
 import numpy as np
 import scipy
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 from scipy.sparse import csr_matrix
 
 from paraflex.arguments import checked_arguments
-from paraflex.arrays import Array
+from paraflex.arrays import Array, Complex, Indices
 from paraflex.dynamics.joint_coordinates import joint_coordinate
 from paraflex.dynamics.linearise import slowest, typical_square, undamped_modes
 from paraflex.dynamics.sensors import SensorRows
@@ -27,7 +27,6 @@ from paraflex.linear.motions import Motions, SecondOrder, driven_equations, moda
 from paraflex.linear.named import NamedModel, not_at_poles, numbers_of, places_in_s
 from paraflex.linear.zeros import StateSpace, Vibrating, by_size, vibrating_zeros, zeros
 
-Complex = NDArray[np.complex128]
 # Admissible relative asymmetry of a stiffness matrix that is regarded as symmetric.
 _SYMMETRIC = 1e-7
 # Sparse matrices are faster than dense ones with more degrees of freedom.
@@ -70,7 +69,7 @@ class LinearModel(NamedModel):
     outputs: tuple[Variable, ...]
     minimal: MinimalEquations
     rows: SensorRows
-    selected: tuple[NDArray[np.int64], NDArray[np.int64]]
+    selected: tuple[Indices, Indices]
 
     def __repr__(self) -> str:
         return f"LinearModel({self.title}: {len(self.states)} states)"

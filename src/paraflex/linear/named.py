@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import scipy
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from paraflex.arguments import numbers_in
+from paraflex.arrays import Complex, Indices
 from paraflex.errors import InputError
 from paraflex.linear.coordinates import Variable, named_axes
 from paraflex.mechanism.quantities import finite
@@ -56,7 +57,7 @@ class NamedModel:
         return xr.Dataset(data, coords=named_axes(self.states, self.inputs, self.outputs), attrs=self._attributes)
 
 
-def places_in_s(frequencies: ArrayLike, field: str = "frequencies") -> NDArray[np.complex128]:
+def places_in_s(frequencies: ArrayLike, field: str = "frequencies") -> Complex:
     """Return s = i omega of finite angular frequencies [rad/s]; complex numbers are values of s already."""
     given = np.atleast_1d(numbers_in(frequencies, field, "biufc"))
     finite(given.ravel().tolist(), field)
@@ -86,7 +87,7 @@ def plain_name(name: str) -> str:
     return "".join(letter if letter.isalnum() or letter == "_" else "_" for letter in name)
 
 
-def numbers_of(names: Sequence[str] | None, have: Sequence[Variable], what: str) -> NDArray[np.int64]:
+def numbers_of(names: Sequence[str] | None, have: Sequence[Variable], what: str) -> Indices:
     """Return the indices of variables by name, by default of all.
 
     Raises

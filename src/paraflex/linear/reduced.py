@@ -9,10 +9,10 @@ from typing import Any
 
 import numpy as np
 import scipy
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from paraflex.arguments import checked_arguments
-from paraflex.arrays import Array
+from paraflex.arrays import Array, Complex
 from paraflex.errors import InputError
 from paraflex.linear.bases import kernel
 from paraflex.linear.coordinates import Variable
@@ -20,8 +20,6 @@ from paraflex.linear.model import LinearModel
 from paraflex.linear.motions import motions
 from paraflex.linear.named import NamedModel, not_at_poles, numbers_of, places_in_s
 from paraflex.linear.zeros import StateSpace, by_size, zeros
-
-Complex = NDArray[np.complex128]
 
 
 class ReductionMethod(Enum):

@@ -17,13 +17,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
-from paraflex.arrays import Array, Numbers
+from paraflex.arrays import Array, Complex, Numbers
 from paraflex.limits import solvable
 from paraflex.linear.independent import sizes, unit_rows
 
-Complex = NDArray[np.complex128]
 # Relative difference of zeros of two squared systems that are regarded as equal.
 _SAME = 1e-6
 # Singular values below this are zero, in a matrix with entries of size one: rounding errors are about 1e-14.

@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import scipy
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from paraflex.arguments import checked_arguments
-from paraflex.arrays import Array
+from paraflex.arrays import Array, Complex
 from paraflex.control.design.controllability import frequency_of
 from paraflex.control.design.sampled import SampledPlant, as_sampled, discretise, places
 from paraflex.control.laws.discrete import DiscreteModel, check_discrete, is_model, matrices_of
@@ -25,7 +25,6 @@ from paraflex.mechanism.quantities import positive
 if TYPE_CHECKING:
     import pandas as pd
 
-Complex = NDArray[np.complex128]
 # Accuracy of poles on the unit circle.
 _ON_CIRCLE = 1e-9
 # Angles about those of the poles, in units of their distance from the circle; number of further angles; largest phase

@@ -10,8 +10,8 @@ import numpy as np
 import scipy
 
 from paraflex.arguments import checked_arguments
-from paraflex.arrays import Array
-from paraflex.control.design.closed_loops import ClosedLoop, Complex, closed_loop, damped_frequency, named_law
+from paraflex.arrays import Array, Complex
+from paraflex.control.design.closed_loops import ClosedLoop, closed_loop, damped_frequency, named_law
 from paraflex.control.design.sampled import SampledPlant, as_sampled
 from paraflex.control.laws.discrete import side_by_side
 from paraflex.control.laws.kinds.rate_feedback import RateFeedback

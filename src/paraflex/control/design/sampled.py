@@ -9,10 +9,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
 from paraflex.arguments import checked_arguments
-from paraflex.arrays import Array
+from paraflex.arrays import Array, Complex
 from paraflex.control.loop.together import check_distinct, same_period, whole_and_part
 from paraflex.errors import InputError
 from paraflex.limits import PLANT_STATES, at_most
@@ -84,7 +83,7 @@ class SampledPlant:
         return self.period
 
     @cached_property
-    def poles(self) -> NDArray[np.complex128]:
+    def poles(self) -> Complex:
         """Eigenvalues z (n,) of A; those of delayed torques are zero."""
         own = np.linalg.eigvals(self.A[: self.own, : self.own])
         return np.concatenate([own, np.zeros(len(self.states) - self.own)]).astype(complex)

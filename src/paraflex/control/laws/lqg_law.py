@@ -6,9 +6,8 @@ from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
-from paraflex.arrays import Array
+from paraflex.arrays import Array, Complex
 from paraflex.control.design.sampled import SampledPlant
 from paraflex.control.laws.controllers import Plant
 from paraflex.control.laws.estimators import KalmanFilter
@@ -16,8 +15,6 @@ from paraflex.control.laws.linear_law import LinearLaw, LinearState
 from paraflex.control.loop.together import SAME
 from paraflex.errors import InputError
 from paraflex.linear.zeros import StateSpace
-
-Complex = NDArray[np.complex128]
 
 
 @dataclass(frozen=True)

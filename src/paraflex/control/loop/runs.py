@@ -8,10 +8,9 @@ from functools import cached_property
 from typing import ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from paraflex.arguments import named_in_errors
-from paraflex.arrays import Array
+from paraflex.arrays import Array, Indices
 from paraflex.control.design.closed_loops import closed_loop, poles_beyond, unstable_poles
 from paraflex.control.laws.discrete import side_by_side
 from paraflex.control.loop.run_loop import ControllerRecord
@@ -148,7 +147,7 @@ class TorqueLog:
         """Return the torques (k, motors) that are commanded at times (k,), those before a change within a slack [s]."""
         return np.array(self._commanded)[self._number(times, slack)]
 
-    def _number(self, times: Array, slack: float) -> NDArray[np.int64]:
+    def _number(self, times: Array, slack: float) -> Indices:
         """Return the indices of the commands that hold at times (k,); the first one holds at the start."""
         changes = np.array(self._times)
         number = np.searchsorted(changes, times - slack, side="left")
