@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 import scipy
 
@@ -17,27 +15,7 @@ _RESOLVED = float(np.sqrt(np.finfo(float).eps))
 _STABLE = 1e-6
 
 
-class BalancedProjection(NamedTuple):
-    """Projection of a balanced truncation: x = right z and z = left x.
-
-    Attributes
-    ----------
-    left, right : (r, n) and (n, r) arrays
-        Left and right projection matrices.
-    hankel : (stable,) array
-        Hankel singular values of the stable part, descending, in units of outputs over inputs.
-    bound : float
-        Upper bound of the error's largest gain over all frequencies: twice the sum of the truncated values (Enns,
-        Glover 1984), with values lost in rounding replaced by the limit of their resolution.
-    """
-
-    left: Array
-    right: Array
-    hankel: Array
-    bound: float
-
-
-def balanced(system: StateSpace, count: int, low: float) -> BalancedProjection:
+def balanced(system: StateSpace, count: int, low: float) -> tuple[StateSpace, Array, float]:
     """Truncate the least controllable and observable states of the stable part.
 
     Parameters
@@ -48,6 +26,16 @@ def balanced(system: StateSpace, count: int, low: float) -> BalancedProjection:
         Number of states to retain, including those of the part that is not stable.
     low : float
         Typical low angular frequency [rad/s].
+
+    Returns
+    -------
+    StateSpace
+        Truncated system.
+    (stable,) array
+        Hankel singular values of the stable part, descending, in units of outputs over inputs.
+    float
+        Upper bound of the error's largest gain over all frequencies: twice the sum of the truncated values (Enns,
+        Glover 1984), with values lost in rounding replaced by the limit of their resolution.
 
     Raises
     ------
@@ -79,12 +67,11 @@ def balanced(system: StateSpace, count: int, low: float) -> BalancedProjection:
     U, hankel, V = scipy.linalg.svd(seen.T @ reached)
     kept = min(count - first, int(np.sum(hankel > 0.0)))
     root = np.sqrt(hankel[:kept])
-    return BalancedProjection(
-        left=np.vstack([whole[free], left[:neutral], (U[:, :kept] / root).T @ seen.T @ left[neutral:]]),
-        right=np.hstack([whole[:, free], right[:, :neutral], right[:, neutral:] @ reached @ (V[:kept].T / root)]),
-        hankel=hankel,
-        bound=2.0 * float(np.sum(np.maximum(hankel[kept:], _RESOLVED * hankel.max(initial=0.0)))),
-    )
+    # Projections z = left x and x = right z.
+    left = np.vstack([whole[free], left[:neutral], (U[:, :kept] / root).T @ seen.T @ left[neutral:]])
+    right = np.hstack([whole[:, free], right[:, :neutral], right[:, neutral:] @ reached @ (V[:kept].T / root)])
+    bound = 2.0 * float(np.sum(np.maximum(hankel[kept:], _RESOLVED * hankel.max(initial=0.0))))
+    return StateSpace(left @ system.A @ right, left @ system.B, system.C @ right, system.D), hankel, bound
 
 
 def _uncoupled(A: Array, low: float) -> tuple[Indices, Indices]:

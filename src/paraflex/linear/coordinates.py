@@ -12,7 +12,7 @@ from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from enum import Enum
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import scipy
@@ -43,13 +43,6 @@ class Variable(NamedTuple):
 
     name: str
     unit: str
-
-
-def named_axes(states: Sequence[Variable], inputs: Sequence[Variable], outputs: Sequence[Variable]) -> dict[str, Any]:
-    """Return names and units of the dimensions state, state_of, input and output, for labelled arrays of matrices."""
-    named = {"state": states, "state_of": states, "input": inputs, "output": outputs}
-    names = {key: [one.name for one in values] for key, values in named.items()}
-    return names | {f"{key}_unit": (key, [one.unit for one in values]) for key, values in named.items()}
 
 
 class CoordinateChoice(NamedTuple):

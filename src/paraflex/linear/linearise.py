@@ -216,7 +216,7 @@ def linear_model(
         outputs=tuple(Variable(sensor.name, mechanism.sensor_unit(sensor)) for sensor in ports.sensors),
         minimal=minimal,
         rows=rows,
-        selected=(np.arange(len(inputs)), np.arange(len(ports.sensors))),
+        selected=np.arange(len(inputs)),
     )
 
 

@@ -216,12 +216,9 @@ def _reduced(model: LinearModel, states: int, method: ReductionMethod, feed_thro
 
 def _balanced(model: LinearModel, states: int) -> ReducedModel:
     """Reduce the model by balanced truncation."""
-    full = model.scaled
-    found = balanced_truncation(full, states, model.low_frequency)
-    left, right = found.left, found.right
-    space = StateSpace(left @ full.A @ right, left @ full.B, full.C @ right, full.D)
-    names = tuple(Variable(f"balanced{k + 1}", "1") for k in range(len(left)))
-    return ReducedModel(model, ReductionMethod.BALANCED, names, space, hankel=found.hankel, bound=found.bound)
+    space, hankel, bound = balanced_truncation(model.scaled, states, model.low_frequency)
+    names = tuple(Variable(f"balanced{k + 1}", "1") for k in range(len(space.A)))
+    return ReducedModel(model, ReductionMethod.BALANCED, names, space, hankel=hankel, bound=bound)
 
 
 def _symmetric(stiffness: Array) -> Array:

@@ -24,11 +24,12 @@ from paraflex.dynamics import sensor_readings
 from paraflex.dynamics.tangents import MotionPoint
 from paraflex.errors import InputError, Moment, SingularPositionError, as_enum
 from paraflex.limits import solvable
-from paraflex.linear.coordinates import CoordinateChoice, Coordinates, FirstCoordinates, Variable, named_axes
+from paraflex.linear.coordinates import CoordinateChoice, Coordinates, FirstCoordinates, Variable
 from paraflex.linear.discrete import InputHold, Prediction, SampledModel, transitions
 from paraflex.linear.linearise import Ports, charted, linear_model, moving, nearest_sample
 from paraflex.linear.minimal import MinimalEquations
 from paraflex.linear.model import LinearModel
+from paraflex.linear.named import labelled, matrices_of
 from paraflex.mechanism import ActuationMode
 from paraflex.motion import MotionRun
 from paraflex.tracking import TrackingRun, TrackingTask
@@ -177,17 +178,10 @@ class VaryingModel:
 
     def to_xarray(self) -> xr.Dataset:
         """Return matrices and nominal values as a dataset labelled by time and names of variables, with units."""
-        import xarray as xr
-
-        data = {
-            "A": (("time", "state", "state_of"), self.A), "B": (("time", "state", "input"), self.B),
-            "C": (("time", "output", "state_of"), self.C), "D": (("time", "output", "input"), self.D),
-            **{f"nominal_{name}": (("time", name), getattr(self.nominal, f"{name}s"))
-               for name in ("state", "input", "output")},
-        }  # fmt: skip
+        nominal = {f"nominal_{name}": (("time", name), getattr(self.nominal, f"{name}s"))
+                   for name in ("state", "input", "output")}  # fmt: skip
         attrs = {"mechanism": self.mechanism, "mode": self.mode, "about": self.about}
-        axes = named_axes(self.states, self.inputs, self.outputs)
-        return xr.Dataset(data, coords={**axes, "time": self.times}, attrs=attrs)
+        return labelled(self, matrices_of(self, first=("time",)) | nominal, attrs, time=self.times)
 
 
 @checked_arguments()

@@ -37,10 +37,10 @@ _FURTHEST = 0.1
 class StateSpace(NamedTuple):
     """Matrices of the state-space model x' = A x + B u, y = C x + D u."""
 
-    A: Array
-    B: Array
-    C: Array
-    D: Array
+    A: Numbers
+    B: Numbers
+    C: Numbers
+    D: Numbers
 
     @classmethod
     def of(cls, *given: Any) -> StateSpace:
@@ -49,6 +49,15 @@ class StateSpace(NamedTuple):
         if not A.size:
             A, B, C = np.zeros((0, 0)), np.zeros((0, D.shape[1])), np.zeros((D.shape[0], 0))
         return cls(A, B, C, D)
+
+    def triangular(self) -> StateSpace:
+        """Return the model in complex states in which A is upper triangular."""
+        upper, basis = scipy.linalg.schur(self.A, output="complex")
+        return StateSpace(upper, basis.conj().T @ self.B, self.C @ basis, self.D)
+
+    def at(self, s: complex) -> Complex:
+        """Return the response C (s - A)^-1 B + D (outputs, inputs) of a model with an upper triangular A."""
+        return self.C @ scipy.linalg.solve_triangular(s * np.eye(len(self.A)) - self.A, self.B) + self.D
 
 
 class Vibrating(NamedTuple):

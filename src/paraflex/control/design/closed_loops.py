@@ -87,8 +87,8 @@ class ClosedLoop:
         return damped_frequency(complex(self.poles[0]), self.plant.period)
 
     @cached_property
-    def _triangular(self) -> tuple[Complex, Complex, Complex]:
-        return _triangular(self.A, self.plant, self.controller)
+    def _at_motors(self) -> StateSpace:
+        return _at_motors(self.A, self.plant, self.controller)
 
     def sensitivity(self, omega: ArrayLike) -> Complex:
         """Return the sensitivity S (k, motors, motors) at the motors, the response to torques that are added there.
@@ -98,11 +98,9 @@ class ClosedLoop:
         omega : (k,) array
             Angular frequencies up to pi / period [rad/s].
         """
-        upper, added, follow = self._triangular
-        eye, one = np.eye(len(upper)), np.eye(added.shape[1])
         z = np.exp(places_in_s(omega, "omega") * self.plant.period)
-        found = [one + follow @ scipy.linalg.solve_triangular(at * eye - upper, added) for at in z]
-        return np.array(found).reshape(-1, *one.shape)
+        one = np.eye(len(self.plant.inputs))
+        return np.array([one + self._at_motors.at(at) for at in z]).reshape(-1, *one.shape)
 
     def loop(self, omega: ArrayLike) -> Complex:
         """Return the responses L_i (k, motors) of the loop opened at one motor, the others closed: 1 + L_i = 1 / S_ii.
@@ -318,11 +316,10 @@ def closed_loops(models: Mapping[str, Any], controller: Any, **settings: Any) ->
     return pd.DataFrame.from_dict(rows, orient="index").sort_values("spectral_radius", kind="stable")
 
 
-def _triangular(A: Array, plant: SampledPlant, law: StateSpace) -> tuple[Complex, Complex, Complex]:
-    """Return the Schur form of A, and the input matrix at the motors and the output matrix of torques in its basis."""
-    upper, basis = scipy.linalg.schur(A.astype(complex), output="complex")
+def _at_motors(A: Array, plant: SampledPlant, law: StateSpace) -> StateSpace:
+    """Return the system from torques that are added at the motors to those of the controller, with a triangular A."""
     added = np.vstack([plant.B, np.zeros((len(law.A), plant.B.shape[1]))])
-    return upper, basis.conj().T @ added, np.hstack([law.D @ plant.C, law.C]) @ basis
+    return StateSpace(A, added, np.hstack([law.D @ plant.C, law.C]), np.zeros((added.shape[1],) * 2)).triangular()
 
 
 def poles_beyond(loop: ClosedLoop, later: int, radius: float) -> int:
@@ -343,14 +340,14 @@ def poles_beyond(loop: ClosedLoop, later: int, radius: float) -> int:
     """
     plant, law = loop.plant, loop.controller
     A = np.block([[plant.A, np.zeros((len(plant.A), len(law.A)))], [law.B @ plant.C, law.A]])
-    upper, added, follow = _triangular(A, plant, law)
+    opened = _at_motors(A, plant, law)
 
     def F(angles: Array) -> Complex:
         z = radius * np.exp(1j * angles)
-        G = [follow @ scipy.linalg.solve_triangular(at * np.eye(len(A)) - upper, added) for at in z]
-        return np.linalg.det(np.eye(len(follow)) - z[:, None, None] ** -later * np.array(G))
+        G = np.array([opened.at(at) for at in z])
+        return np.linalg.det(np.eye(len(opened.C)) - z[:, None, None] ** -later * G)
 
-    poles = np.diag(upper)
+    poles = np.diag(opened.A)
     near = np.abs(np.angle(poles))[:, None] + np.abs(radius - np.abs(poles))[:, None] * _ABOUT
     angles = np.unique(np.concatenate([np.linspace(0.0, np.pi, _GRID), near[(near > 0.0) & (near < np.pi)]]))
     values = F(angles)
