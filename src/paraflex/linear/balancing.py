@@ -6,8 +6,8 @@ import numpy as np
 import scipy
 
 from paraflex.arrays import Array, Indices
+from paraflex.dynamics.state_space import StateSpace
 from paraflex.errors import InputError
-from paraflex.linear.zeros import StateSpace
 
 # Hankel singular values below this fraction of the largest are lost in the rounding of the Gramians.
 _RESOLVED = float(np.sqrt(np.finfo(float).eps))

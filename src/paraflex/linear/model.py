@@ -17,6 +17,7 @@ from paraflex.dynamics.joint_coordinates import joint_coordinate
 from paraflex.dynamics.linearise import slowest, typical_square, undamped_modes
 from paraflex.dynamics.sensors import SensorRows
 from paraflex.dynamics.sparse import stiffness_diagonal
+from paraflex.dynamics.state_space import StateSpace
 from paraflex.errors import InputError
 from paraflex.linear.bases import kernel
 from paraflex.linear.coordinates import Variable
@@ -24,7 +25,7 @@ from paraflex.linear.descriptor import poles_near, response_at
 from paraflex.linear.minimal import MinimalEquations
 from paraflex.linear.motions import Motions, SecondOrder, driven_equations, modal_damping, motions
 from paraflex.linear.named import NamedModel, numbers_of
-from paraflex.linear.zeros import StateSpace, Vibrating, by_size, vibrating_zeros, zeros
+from paraflex.linear.zeros import Vibrating, by_size, vibrating_zeros, zeros
 
 # Admissible relative asymmetry of a stiffness matrix that is regarded as symmetric.
 _SYMMETRIC = 1e-7

@@ -13,13 +13,14 @@ from numpy.typing import ArrayLike
 
 from paraflex.arguments import checked_arguments
 from paraflex.arrays import Array, Complex
+from paraflex.dynamics.state_space import StateSpace
 from paraflex.errors import InputError
 from paraflex.linear.bases import kernel
 from paraflex.linear.coordinates import Variable
 from paraflex.linear.model import LinearModel
 from paraflex.linear.motions import motions
 from paraflex.linear.named import NamedModel, numbers_of
-from paraflex.linear.zeros import StateSpace, by_size, zeros
+from paraflex.linear.zeros import by_size, zeros
 
 
 class ReductionMethod(Enum):

@@ -12,6 +12,7 @@ import scipy
 from paraflex.arguments import checked_arguments
 from paraflex.arrays import Array
 from paraflex.dynamics import State
+from paraflex.dynamics.state_space import StateSpace
 from paraflex.errors import InputError, as_enum
 from paraflex.kinematics import ModelWithPaths
 from paraflex.limits import solvable
@@ -22,7 +23,6 @@ from paraflex.linear.linearise import linear_model, linearise, operating_point
 from paraflex.linear.model import LinearModel
 from paraflex.linear.reduced import ReducedModel, ReductionMethod
 from paraflex.linear.varying import describes
-from paraflex.linear.zeros import StateSpace
 from paraflex.mechanism import ActuationMode, Mechanism, Start
 from paraflex.motion import MotionRun
 from paraflex.tracking import TrackingRun, TrackingTask

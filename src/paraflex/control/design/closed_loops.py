@@ -17,9 +17,9 @@ from paraflex.arrays import Array, Complex
 from paraflex.control.design.controllability import frequency_of
 from paraflex.control.design.sampled import SampledPlant, as_sampled, discretise, places
 from paraflex.control.laws.discrete import DiscreteModel, check_discrete, is_model, matrices_of
+from paraflex.dynamics.state_space import StateSpace
 from paraflex.errors import InputError, ResultWarning, warn_user, within
 from paraflex.linear.named import places_in_s
-from paraflex.linear.zeros import StateSpace
 from paraflex.mechanism.quantities import positive
 
 if TYPE_CHECKING:

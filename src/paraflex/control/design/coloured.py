@@ -11,8 +11,8 @@ import scipy
 from paraflex.arrays import Array
 from paraflex.control.design.sampled import NamedMatrices, SampledPlant, as_sampled, discretise, named_matrices
 from paraflex.control.loop.filters import transfer_function
+from paraflex.dynamics.state_space import StateSpace
 from paraflex.errors import InputError
-from paraflex.linear.zeros import StateSpace
 from paraflex.mechanism.quantities import all_known, positive
 
 # Names of the noise inputs of the filters.

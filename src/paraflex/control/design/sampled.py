@@ -13,10 +13,10 @@ import scipy
 from paraflex.arguments import checked_arguments
 from paraflex.arrays import Array, Complex
 from paraflex.control.loop.together import check_distinct, same_period, whole_and_part
+from paraflex.dynamics.state_space import StateSpace
 from paraflex.errors import InputError
 from paraflex.limits import PLANT_STATES, at_most
 from paraflex.linear.model import LinearModel
-from paraflex.linear.zeros import StateSpace
 from paraflex.mechanism.quantities import not_negative, positive
 
 

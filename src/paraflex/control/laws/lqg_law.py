@@ -13,8 +13,8 @@ from paraflex.control.laws.controllers import Plant
 from paraflex.control.laws.estimators import KalmanFilter
 from paraflex.control.laws.linear_law import LinearLaw, LinearState
 from paraflex.control.loop.together import SAME
+from paraflex.dynamics.state_space import StateSpace
 from paraflex.errors import InputError
-from paraflex.linear.zeros import StateSpace
 
 
 @dataclass(frozen=True)

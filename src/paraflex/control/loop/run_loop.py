@@ -390,14 +390,4 @@ def _names(controllers: Sequence[Controller]) -> list[str]:
     names = [getattr(each, "name", "controller") for each in controllers]
     for name in names:
         check_name(name)
-    if len(set(names)) == len(names):
-        return names
-    twice = [name for name in names if names.count(name) > 1]
-    numbers = dict.fromkeys(twice, 0)
-    found = []
-    for name in names:
-        if name in numbers:
-            numbers[name] += 1
-            name = f"{name}{numbers[name]}"
-        found.append(name)
-    return found
+    return [f"{name}{names[: k + 1].count(name)}" if names.count(name) > 1 else name for k, name in enumerate(names)]

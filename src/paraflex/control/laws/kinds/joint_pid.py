@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 import scipy
@@ -19,6 +19,7 @@ from paraflex.actuation import required_effort
 from paraflex.arguments import checked_arguments
 from paraflex.arrays import Array
 from paraflex.control.laws.controllers import Plant
+from paraflex.control.laws.discrete import DiscreteModel
 from paraflex.control.laws.estimators import CUTOFF, BackwardDifference
 from paraflex.control.laws.law import Law, given
 from paraflex.control.laws.linear_law import LinearLaw
@@ -27,9 +28,6 @@ from paraflex.errors import InputError
 from paraflex.mechanism import Mechanism
 from paraflex.mechanism.measured import encoders_of
 from paraflex.mechanism.quantities import all_known
-
-if TYPE_CHECKING:
-    from paraflex.control.laws.discrete import DiscreteModel
 
 Gain = float | Sequence[float] | Mapping[str, float]
 
@@ -117,8 +115,6 @@ class JointPID(Law, kind="pid", title="PID of joints"):
         InputError
             Motors that do not each have a joint of their own.
         """
-        from paraflex.control.laws.discrete import DiscreteModel
-
         names = tuple(motor.name for motor in mechanism.motors) if motors is None else tuple(motors)
         joints = encoders_of(mechanism, names)
         if len(joints) != len(names):
