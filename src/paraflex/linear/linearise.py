@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import scipy
@@ -123,12 +123,8 @@ def linearise(
     SingularPositionError
         The position is singular, so that no coordinates describe the motion.
     """
-    return linear_model(
-        *operating_point(
-            source, mode=mode, at=at, assembly=assembly, start=start, balanced=balanced, forces=forces,
-            prescribed=prescribed, coordinates=coordinates,
-        )
-    )  # fmt: skip
+    pose = {"at": at, "assembly": assembly, "start": start, "balanced": balanced or None}
+    return linear_model(*operating_point(source, mode, forces, prescribed, coordinates, **pose))
 
 
 class OperatingPoint(NamedTuple):
@@ -143,21 +139,20 @@ class OperatingPoint(NamedTuple):
 
 def operating_point(
     source: Mechanism | ModelWithPaths | TrackingTask | TrackingRun | MotionRun,
-    *,
     mode: str | ActuationMode | None = None,
-    at: float | None = None,
-    assembly: str | None = None,
-    start: Start | State | None = None,
-    balanced: bool = False,
     forces: Sequence[str] = (),
     prescribed: Sequence[str] = (),
     coordinates: FirstCoordinates | str = FirstCoordinates.MOTORS,
+    **pose: Any,
 ) -> OperatingPoint:
-    """Return the operating point, inputs and outputs of a linear model: see `linearise`."""
+    """Return the operating point, inputs and outputs of a linear model: see `linearise`.
+
+    Arguments of `linearise` that are not named here are those of `pose`, None where they are not given.
+    """
     moves = isinstance(source, TrackingTask | TrackingRun | MotionRun)
-    others = {"assembly": assembly, "start": start, "balanced": balanced or None} if moves else {"at": at}
-    for name, value in others.items():
-        if value is not None:
+    at, assembly, start, balanced = (pose.get(name) for name in ("at", "assembly", "start", "balanced"))
+    for name in ("assembly", "start", "balanced") if moves else ("at",):
+        if (value := pose.get(name)) is not None:
             raise InputError(
                 f"has no meaning for a {'motion' if moves else 'pose at rest'}", field=name, value=value,
                 remedy="leave it out, or give the mechanism" if moves else "leave it out, or give a plan or a run",

@@ -213,8 +213,7 @@ def law_of(controller: Any) -> StateSpace:
     InputError
         A controller without matrices, or a continuous one.
     """
-    inner = getattr(controller, "law", None)
-    own = controller if inner is None or callable(inner) else inner
+    own = _inner(controller)
     own = getattr(own, "state_space", own)
     if not is_model(own) and not all(hasattr(own, name) for name in ("A", "B", "C", "D")):
         raise InputError("is not a linear law", field="controller", value=controller,
@@ -393,9 +392,7 @@ def damped_frequency(z: complex, period: float) -> tuple[float, float]:
 
 def _sampled_for(model: Any, controller: Any, period: float | None, delay: float | None) -> SampledPlant:
     """Return the plant at the given period and delay, by default the controller's."""
-    inner = getattr(controller, "law", None)
-    sources = [controller, *([inner] if inner is not None and not callable(inner) else [])]
-    for source in sources:
+    for source in (controller, _inner(controller)):
         period = _own(source, ("period", "dt")) if period is None else period
         delay = _own(source, ("delay",)) if delay is None else delay
     if isinstance(model, SampledPlant):
@@ -404,6 +401,12 @@ def _sampled_for(model: Any, controller: Any, period: float | None, delay: float
         raise InputError("is missing", field="period", remedy="give it in seconds")
     positive(period, "period", "s")
     return discretise(model, period, 0.0 if delay is None else delay)
+
+
+def _inner(controller: Any) -> Any:
+    """Return the law of a `SampledController`, and another controller as it is."""
+    law = getattr(controller, "law", None)
+    return controller if law is None or callable(law) else law
 
 
 def _own(source: Any, attributes: Sequence[str]) -> float | None:

@@ -153,8 +153,8 @@ def discretise(model: Any, period: float, delay: float = 0.0) -> SampledPlant:
     not_negative(delay, "delay", "s")
     whole, part = whole_and_part(delay / period)
     scaled, back = _scaled(model, named.matrices)
-    late, early = _held(scaled, period * part), _held(scaled, period * (1.0 - part))
-    over = _held(scaled, period)
+    times = period * part, period * (1.0 - part), period
+    late, early, over = (scipy.signal.cont2discrete(scaled, time)[:2] for time in times)
     old, new = (back @ each for each in (early[0] @ late[1], early[1]))
     n, m, p = len(named.states), len(named.inputs), len(named.outputs)
     feeds = bool(np.any(named.matrices.D))
@@ -261,12 +261,3 @@ def _scaled(model: Any, matrices: StateSpace) -> tuple[StateSpace, Array]:
         return matrices, np.zeros((0, 0))
     A, (sizes, _) = scipy.linalg.matrix_balance(matrices.A, permute=False, separate=True)
     return StateSpace(A, matrices.B / sizes[:, None], matrices.C * sizes, matrices.D), np.diag(sizes)
-
-
-def _held(matrices: StateSpace, time: float) -> tuple[Array, Array]:
-    """Return Phi (n, n) and Gamma (n, m) over a time [s] with inputs held."""
-    n, m = matrices.B.shape
-    both = np.zeros((n + m, n + m))
-    both[:n, :n], both[:n, n:] = matrices.A, matrices.B
-    whole = scipy.linalg.expm(both * time)
-    return whole[:n, :n], whole[:n, n:]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from copy import copy
 from dataclasses import dataclass
 from functools import cached_property
 from typing import ClassVar
@@ -105,31 +106,26 @@ class TorqueLog:
 
     def __init__(self, lags: Array, start: float, before: Array) -> None:
         self._lags, self._start = lags, start
-        self._times: list[float] = []
-        # Commanded torques, and torques that acted at the time of each command.
-        self._commanded: list[Array] = [before]
-        self._begun: list[Array] = [before]
+        # Time of each command, torques that acted then, and torques commanded; the first is before the start.
+        self._commands: list[tuple[float, Array, Array]] = [(0.0, before, before)]
 
     def __len__(self) -> int:
         """Return the number of commands."""
-        return len(self._times)
+        return len(self._commands) - 1
 
     def note(self, t: float, torques: Array) -> None:
         """Add torques (motors,) that are commanded from a time on."""
-        acting = self.now(t)
-        self._times.append(t)
-        self._commanded.append(torques)
-        self._begun.append(acting)
+        self._commands.append((t, self.now(t), torques))
 
     @property
     def last(self) -> tuple[float, Array, Array]:
         """Time of the last command, torques that acted then, and torques commanded from then on (motors,)."""
-        return self._times[-1] if self._times else 0.0, self._begun[-1], self._commanded[-1]
+        return self._commands[-1]
 
     def copy(self) -> TorqueLog:
         """Return a copy that can be continued independently."""
-        other = TorqueLog(self._lags, self._start, self._commanded[0])
-        other._times, other._commanded, other._begun = self._times.copy(), self._commanded.copy(), self._begun.copy()
+        other = copy(self)
+        other._commands = self._commands.copy()
         return other
 
     def now(self, t: float) -> Array:
@@ -140,16 +136,16 @@ class TorqueLog:
     def at(self, times: Array, slack: float) -> Array:
         """Return the torques (k, motors) that act at times (k,), those before a change within a slack [s]."""
         number = self._number(times, slack)
-        since = np.array([0.0, *self._times])[number]
-        return self._relaxed(times - since, np.array(self._begun)[number], np.array(self._commanded)[number])
+        since, begun, commanded = (np.array(each)[number] for each in zip(*self._commands, strict=True))
+        return self._relaxed(times - since, begun, commanded)
 
     def given(self, times: Array, slack: float) -> Array:
         """Return the torques (k, motors) that are commanded at times (k,), those before a change within a slack [s]."""
-        return np.array(self._commanded)[self._number(times, slack)]
+        return np.array([torques for _, _, torques in self._commands])[self._number(times, slack)]
 
     def _number(self, times: Array, slack: float) -> Indices:
         """Return the indices of the commands that hold at times (k,); the first one holds at the start."""
-        changes = np.array(self._times)
+        changes = np.array([t for t, _, _ in self._commands[1:]])
         number = np.searchsorted(changes, times - slack, side="left")
         if changes.size and changes[0] <= self._start + slack:
             number = np.where(times <= changes[0] + slack, 1, number)
