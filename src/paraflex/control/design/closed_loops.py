@@ -20,7 +20,6 @@ from paraflex.control.laws.discrete import DiscreteModel, check_discrete, is_mod
 from paraflex.dynamics.state_space import StateSpace
 from paraflex.errors import InputError, ResultWarning, warn_user, within
 from paraflex.linear.named import places_in_s
-from paraflex.mechanism.quantities import positive
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -399,7 +398,6 @@ def _sampled_for(model: Any, controller: Any, period: float | None, delay: float
         return model if period is None else as_sampled(model, period, model.delay)
     if period is None:
         raise InputError("is missing", field="period", remedy="give it in seconds")
-    positive(period, "period", "s")
     return discretise(model, period, 0.0 if delay is None else delay)
 
 

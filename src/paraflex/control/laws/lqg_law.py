@@ -118,18 +118,13 @@ class LQGDesign:
         The states are the estimate before the reading, and the integrals.
         """
         one, L, n = self.filter, self.L, len(self.filter.A)
-        rows = self._integrals
+        rows = self.period * np.eye(len(self.measured))[[self.measured.index(one) for one in self.regulator.integrated]]
         K, K_i = np.split(self.K, [n], axis=1)
         rest = np.eye(n) - L @ one.C
         C, D = np.hstack([-K @ rest, -K_i]), -K @ L
         A = np.vstack([np.hstack([one.A @ rest, np.zeros((n, len(rows)))]) + one.B @ C,
                        np.eye(len(rows), n + len(rows), n)])  # fmt: skip
         return StateSpace(A, np.vstack([one.A @ L + one.B @ D, rows]), C, D)
-
-    @property
-    def _integrals(self) -> Array:
-        """Contribution of a reading to the integrals (integrated, measured)."""
-        return self.period * np.eye(len(self.measured))[[self.measured.index(one) for one in self.regulator.integrated]]
 
     def law(self) -> LQGLaw:
         """Return the control law in its initial state, for `SampledController`."""
@@ -204,11 +199,8 @@ class LQGLaw:
     @property
     def integrals(self) -> Array:
         """Integrals of outputs (integrated,)."""
-        return (
-            np.zeros(len(self.design.regulator.integrated))
-            if self._state is None
-            else self._state.x[len(self.design.start) :]
-        )
+        integrated = len(self.design.regulator.integrated)
+        return np.zeros(integrated) if self._state is None else self._state.x[len(self.design.start) :]
 
     def start(self, plant: Plant) -> LinearLaw | None:
         """Reset the state, and return the law in a run: see `LQGDesign.in_run`; None if a subclass may step itself."""

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from copy import copy
 from dataclasses import dataclass
 from functools import cached_property
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -53,6 +52,11 @@ class Controlled:
         assert self.acting is not None
         return self.acting
 
+    @cached_property
+    def findings(self: Any) -> tuple[Finding, ...]:
+        """Findings on controllers, on events in the run, and on results that are implausible for the mechanism."""
+        return (*unstable_loop(self), *super().findings)  # pyright: ignore[reportAttributeAccessIssue]
+
 
 @named_in_errors("a run under controllers", "the run that Simulation.run returns")
 @dataclass(frozen=True)
@@ -63,14 +67,6 @@ class ControlledTracking(Controlled, TrackingRun):
     def follows(self) -> bool:
         """Whether torques drive the mechanism along the path."""
         return True
-
-    @cached_property
-    def findings(self) -> tuple[Finding, ...]:
-        """Findings on controllers, on events in the run, and on results that are implausible for the mechanism."""
-        return (
-            *unstable_loop(self, self.controllers, self.task.start.time, f"mode {self.mode.name}"),
-            *super().findings,
-        )
 
 
 @named_in_errors("a run under controllers", "the run that Simulation.run returns")
@@ -84,11 +80,6 @@ class ControlledMotion(Controlled, MotionRun):
     def in_time(self) -> bool:
         """Whether torques change in time."""
         return True
-
-    @cached_property
-    def findings(self) -> tuple[Finding, ...]:
-        """Findings on controllers, on events in the run, and on implausible results."""
-        return (*unstable_loop(self, self.controllers, float(self.solution.t[0]), ""), *super().findings)
 
 
 class TorqueLog:
@@ -160,25 +151,13 @@ class TorqueLog:
         return commanded + np.where(self._lags > 0.0, left, 0.0) * (begun - commanded)
 
 
-def unstable_loop(
-    run: TrackingRun | MotionRun, records: Sequence[ControllerRecord], start: float, place: str
-) -> tuple[Finding, ...]:
+def unstable_loop(run: ControlledTracking | ControlledMotion) -> tuple[Finding, ...]:
     """Return a finding if the run's linear controllers, of one period and delay, make the linearised loop unstable.
 
     Limits of torques and rates are disregarded. Without a linear model, at a singular configuration for example, the
     loop is not checked.
-
-    Parameters
-    ----------
-    run : TrackingRun or MotionRun
-        Run under the controllers.
-    records : sequence of ControllerRecord
-        Records of all controllers of the run.
-    start : float
-        Time at which the run starts, about which it is linearised [s].
-    place : str
-        Place to which the finding refers, such as "mode ++".
     """
+    records = run.controllers
     if not records:
         return ()
     laws = [one.linear for one in records]
@@ -191,7 +170,7 @@ def unstable_loop(
         return ()
     radius = _GROWS ** (1.0 / max(len(first.t), _SAMPLES))
     try:
-        model = linearise(run, at=start)
+        model = linearise(run)
         now = closed_loop(model, side_by_side(linear), period=first.period, delay=part * first.period)
         if len(now.A) + later * len(now.plant.inputs) > _STATES:
             growing = f"{count} with |z| > {radius:.8g}" if (count := poles_beyond(now, later, radius)) else ""
@@ -206,4 +185,5 @@ def unstable_loop(
     several = ", ".join(f'"{one.name}"' for one in records)
     text = f"controller {several}: the sampled loop is unstable about the start: {growing}"
     remedy = "lower the gains, sample faster, reduce the delay; add link damping, rotor inertia, or noise in designs"
+    place = f"mode {run.mode.name}" if isinstance(run, TrackingRun) else ""
     return (Finding("loop-unstable", place, text, remedy),)
