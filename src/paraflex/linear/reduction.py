@@ -22,7 +22,7 @@ from paraflex.linear.coordinates import Variable
 from paraflex.linear.linearise import linear_model, linearise, operating_point
 from paraflex.linear.model import LinearModel
 from paraflex.linear.reduced import ReducedModel, ReductionMethod
-from paraflex.linear.varying import describes
+from paraflex.linear.varying import describes, same_bodies
 from paraflex.mechanism import ActuationMode, Mechanism, Start
 from paraflex.motion import MotionRun
 from paraflex.tracking import TrackingRun, TrackingTask
@@ -151,13 +151,12 @@ def _linear_model(source: Source, given: Sequence[ReducedModel], options: dict[s
         return source
     if not given:
         return linearise(source, **options)
-    first, point = given[0].full, operating_point(source, **options)
-    same = len(point.coordinates.measured) > np.max(first.minimal.chosen.joints, initial=-1)
-    if not same or [body.all for body in point.coordinates.system.bodies] != [
-        body.all for body in first.minimal.system.bodies
-    ]:
-        raise _other_mechanism_error(given[0], point.coordinates.system.mechanism.name)
-    model = linear_model(*point, chosen=first.minimal.chosen)
+    first, (chart, point, unbalanced) = given[0].full, operating_point(source, **options)
+    system = chart.coordinates.system
+    same = len(chart.coordinates.measured) > np.max(first.minimal.chosen.joints, initial=-1)
+    if not same or not same_bodies(system, first.minimal.system):
+        raise _other_mechanism_error(given[0], system.mechanism.name)
+    model = linear_model(chart, point, unbalanced, chosen=first.minimal.chosen)
     _check_alike(given[0], model)
     if not describes(model.minimal, first.minimal):
         raise InputError(
@@ -169,7 +168,7 @@ def _linear_model(source: Source, given: Sequence[ReducedModel], options: dict[s
 
 def _check_alike(basis: ReducedModel, model: LinearModel) -> None:
     """Raise an `InputError` for a basis of another mechanism or in other coordinates."""
-    if [body.all for body in model.minimal.system.bodies] != [body.all for body in basis.full.minimal.system.bodies]:
+    if not same_bodies(model.minimal.system, basis.full.minimal.system):
         raise _other_mechanism_error(basis, model.mechanism)
     if basis.full.states != model.states:
         own = {one.name for one in model.states}

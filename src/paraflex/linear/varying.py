@@ -20,13 +20,13 @@ from scipy.interpolate import make_interp_spline
 
 from paraflex.arguments import checked_arguments
 from paraflex.arrays import Array
-from paraflex.dynamics import sensor_readings
+from paraflex.dynamics import System, sensor_readings
 from paraflex.dynamics.tangents import MotionPoint
 from paraflex.errors import InputError, Moment, SingularPositionError, as_enum
 from paraflex.limits import solvable
 from paraflex.linear.coordinates import CoordinateChoice, Coordinates, FirstCoordinates, Variable
 from paraflex.linear.discrete import InputHold, Prediction, SampledModel, transitions
-from paraflex.linear.linearise import Ports, charted, linear_model, moving, nearest_sample
+from paraflex.linear.linearise import Chart, charted, linear_model, moving, nearest_sample
 from paraflex.linear.minimal import MinimalEquations
 from paraflex.linear.model import LinearModel
 from paraflex.linear.named import labelled, matrices_of
@@ -76,12 +76,10 @@ class VaryingModel:
         State-space matrices at the samples.
     nominal : Along
         States, inputs and outputs of the nominal motion.
-    coordinates : Coordinates
-        Candidate coordinates.
+    chart : Chart
+        Candidate coordinates, and description of inputs and outputs.
     chosen : CoordinateChoice
-        Minimal coordinates among them, which are states.
-    ports : Ports
-        Description of inputs and outputs.
+        Minimal coordinates among the candidates, which are states.
     modal : (array, array)
         Transformation to scaled modal states at the first sample, see `LinearModel.modal_states`.
     """
@@ -98,9 +96,8 @@ class VaryingModel:
     C: Array
     D: Array
     nominal: Along
-    coordinates: Coordinates
+    chart: Chart
     chosen: CoordinateChoice
-    ports: Ports
     modal: tuple[Array, Array]
 
     @checked_arguments()
@@ -117,11 +114,11 @@ class VaryingModel:
         InputError
             The run is of a mechanism with other bodies.
         """
-        found = moving(run, self.ports.mode)
-        if [body.all for body in found.system.bodies] != [body.all for body in self.coordinates.system.bodies]:
+        found = moving(run, self.chart.ports.mode)
+        if not same_bodies(found.system, self.chart.coordinates.system):
             raise InputError("belongs to a mechanism with other bodies", field="run", value=found.system.mechanism.name,
                              remedy="give a run of the mechanism of this model")  # fmt: skip
-        return _along([found.point(k) for k in range(found.times.size)], self.coordinates, self.chosen, self.ports)
+        return _along([found.point(k) for k in range(found.times.size)], self.chart, self.chosen)
 
     @checked_arguments()
     @solvable("the sampled model")
@@ -221,25 +218,25 @@ def linearise_along(
     SingularPositionError
         A position is singular, so that no coordinates describe the motion.
     """
-    motion, ports, choice = charted(source, mode, forces, prescribed, coordinates)
+    motion, chart = charted(source, mode, forces, prescribed, coordinates)
     given = range(motion.times.size) if times is None else [nearest_sample(motion.times, at) for at in times]
     samples = np.unique(given).tolist()
     if len(samples) < _FEWEST:
         raise InputError("too few samples of the motion", field="times", value=len(samples),
                          remedy=f"give at least {_FEWEST} different ones")  # fmt: skip
     points = [motion.point(k) for k in samples]
-    chosen, found = in_one_chart(points, choice, ports, motion.about, lambda model: model.state_space)
-    first, (A, B, C, D) = linear_model(choice, points[0], ports, motion.about, chosen=chosen), zip(*found, strict=True)
+    chosen, found = in_one_chart(points, chart, lambda model: model.state_space)
+    first, (A, B, C, D) = linear_model(chart, points[0], chosen=chosen), zip(*found, strict=True)
     return VaryingModel(
         mechanism=first.mechanism, mode=first.mode, about=first.about, states=first.states, inputs=first.inputs,
         outputs=first.outputs, times=np.array([point.time for point in points]), A=np.array(A), B=np.array(B),
-        C=np.array(C), D=np.array(D), nominal=_along(points, choice, chosen, ports), coordinates=choice,
-        chosen=chosen, ports=ports, modal=first.modal_states,
+        C=np.array(C), D=np.array(D), nominal=_along(points, chart, chosen), chart=chart,
+        chosen=chosen, modal=first.modal_states,
     )  # fmt: skip
 
 
 def in_one_chart(
-    points: Sequence[MotionPoint], coordinates: Coordinates, ports: Ports, about: str, take: Callable[[LinearModel], T]
+    points: Sequence[MotionPoint], chart: Chart, take: Callable[[LinearModel], T]
 ) -> tuple[CoordinateChoice, list[T]]:
     """Linearise at points of a motion in common minimal coordinates, and apply `take` to each linear model.
 
@@ -257,10 +254,10 @@ def in_one_chart(
     SingularPositionError
         No coordinates describe the motion at all points.
     """
-    without: list[int] = []
+    coordinates, without = chart.coordinates, list[int]()
     chosen, tries = coordinates.choose(coordinates.at(points[0])), len(coordinates.measured) + _MORE
     while True:
-        found = _taken((linear_model(coordinates, point, ports, about, chosen=chosen) for point in points), take)
+        found = _taken((linear_model(chart, point, chosen=chosen) for point in points), take)
         if not isinstance(found, LinearModel):
             return chosen, found
         without += _given_up(found.minimal, coordinates)
@@ -278,6 +275,11 @@ def _taken(models: Iterable[LinearModel], take: Callable[[LinearModel], T]) -> l
             return model
         found.append(take(model))
     return found
+
+
+def same_bodies(system: System, other: System) -> bool:
+    """Return whether two systems have the same coordinates of bodies."""
+    return [body.all for body in system.bodies] == [body.all for body in other.bodies]
 
 
 def describes(minimal: MinimalEquations, elsewhere: MinimalEquations) -> bool:
@@ -303,8 +305,9 @@ def _singular(minimal: MinimalEquations, names: Sequence[str]) -> SingularPositi
     )  # fmt: skip
 
 
-def _along(points: Sequence[MotionPoint], coordinates: Coordinates, chosen: CoordinateChoice, ports: Ports) -> Along:
+def _along(points: Sequence[MotionPoint], chart: Chart, chosen: CoordinateChoice) -> Along:
     """Return states, inputs and outputs at points of a motion."""
+    coordinates, ports, _ = chart
     mechanism = coordinates.system.mechanism
     t, q, v, a, multipliers, acting = (np.array(part) for part in zip(*points, strict=True))
     torques = acting[:, : len(mechanism.motors)]

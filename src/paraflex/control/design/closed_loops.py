@@ -15,7 +15,7 @@ from numpy.typing import ArrayLike
 from paraflex.arguments import checked_arguments
 from paraflex.arrays import Array, Complex
 from paraflex.control.design.controllability import frequency_of
-from paraflex.control.design.sampled import SampledPlant, as_sampled, discretise, places
+from paraflex.control.design.sampled import SampledPlant, WithPoles, as_sampled, discretise, places
 from paraflex.control.laws.discrete import DiscreteModel, check_discrete, is_model, matrices_of
 from paraflex.dynamics.state_space import StateSpace
 from paraflex.errors import InputError, ResultWarning, warn_user, within
@@ -34,7 +34,7 @@ _LATEST, _STEP = 200, 0.25
 
 
 @dataclass(frozen=True)
-class ClosedLoop:
+class ClosedLoop(WithPoles):
     """Sampled plant in feedback with a linear controller, u = controller(y).
 
     Attributes
@@ -69,11 +69,6 @@ class ClosedLoop:
         """Eigenvalues z (n,), the largest first."""
         found = np.asarray(np.linalg.eigvals(self.A), dtype=complex)
         return found[np.argsort(-np.abs(found), kind="stable")]
-
-    @property
-    def spectral_radius(self) -> float:
-        """Largest magnitude of the poles; the loop is stable if it is below one."""
-        return float(np.max(np.abs(self.poles), initial=0.0))
 
     @property
     def stable(self) -> bool:

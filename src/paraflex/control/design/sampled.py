@@ -29,6 +29,15 @@ class NamedMatrices(NamedTuple):
     outputs: tuple[str, ...]
 
 
+class WithPoles:
+    """Base class of discrete systems with `poles` z."""
+
+    @property
+    def spectral_radius(self: Any) -> float:
+        """Largest magnitude of the poles; a loop is stable if it is below one."""
+        return float(np.max(np.abs(self.poles), initial=0.0))
+
+
 @dataclass(frozen=True)
 class SampledPlant:
     """Sampled linear plant x_k+1 = A x_k + B u_k with readings y_k = C x_k, as seen by a digital controller.

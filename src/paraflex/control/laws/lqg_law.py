@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from paraflex.arrays import Array, Complex
-from paraflex.control.design.sampled import SampledPlant
+from paraflex.control.design.sampled import SampledPlant, WithPoles
 from paraflex.control.laws.controllers import Plant
 from paraflex.control.laws.estimators import KalmanFilter
 from paraflex.control.laws.linear_law import LinearLaw, LinearState
@@ -18,7 +18,7 @@ from paraflex.errors import InputError
 
 
 @dataclass(frozen=True)
-class Regulator:
+class Regulator(WithPoles):
     """State feedback u = -`gain` [x; integrals] of a sampled plant.
 
     Attributes
@@ -41,14 +41,9 @@ class Regulator:
     integrated: tuple[str, ...]
     poles: Complex
 
-    @property
-    def spectral_radius(self) -> float:
-        """Largest magnitude of the poles."""
-        return float(np.max(np.abs(self.poles), initial=0.0))
-
 
 @dataclass(frozen=True)
-class LQGDesign:
+class LQGDesign(WithPoles):
     """Regulator that acts on the estimate of a Kalman filter.
 
     Attributes
@@ -85,11 +80,6 @@ class LQGDesign:
     def poles(self) -> Complex:
         """Poles z of the closed loop on the plant of the design: those of the regulator and of the filter."""
         return np.concatenate([self.regulator.poles, self.filter.poles])
-
-    @property
-    def spectral_radius(self) -> float:
-        """Largest magnitude of the poles."""
-        return float(np.max(np.abs(self.poles), initial=0.0))
 
     @property
     def period(self) -> float:

@@ -13,7 +13,7 @@ from paraflex.arrays import Array
 from paraflex.control.laws.controllers import Controller, Plant
 from paraflex.control.laws.discrete import DiscreteModel
 from paraflex.control.loop.chain import CHANGING, ChainSample, SampledController, as_law
-from paraflex.control.loop.inside import exception_of, linear_model, wrong_torques
+from paraflex.control.loop.inside import exception_of, linear_model
 from paraflex.control.loop.together import (
     check_distinct,
     check_name,
@@ -24,7 +24,7 @@ from paraflex.control.loop.together import (
     whole_and_part,
 )
 from paraflex.errors import InputError
-from paraflex.kernel.sampled import ACTED, SAMPLED, SampledLaw
+from paraflex.kernel.sampled import ACTED, RAISED, SAMPLED, WRONG, SampledLaw
 from paraflex.mechanism.quantities import not_negative
 
 
@@ -170,13 +170,12 @@ class Loop:
     @property
     def failure(self) -> LawFailure | None:
         """Failure that ended a run in the compiled time loop; None without one."""
-        if self.inside is None:
+        law = self.inside
+        if law is None or not law.counts[WRONG]:
             return None
-        raised = exception_of(self.inside, self.controllers[0])
-        if raised is not None:
-            return _raised(self.names[0], raised)
-        wrong = wrong_torques(self.inside)
-        return _not_finite(self.names[0], [self._plants[0].outputs[k] for k in wrong]) if wrong else None
+        if law.counts[WRONG] == RAISED:
+            return _raised(self.names[0], exception_of(law, self.controllers[0]))
+        return _not_finite(self.names[0], self._plants[0].outputs, law.wanted[law.counts[SAMPLED]])
 
     @property
     def whole(self) -> list[str]:
@@ -246,9 +245,8 @@ class Loop:
         if torques.shape != (len(outputs),):
             count = "one" if torques.size == 1 else " x ".join(map(str, torques.shape))
             raise LawFailure(f'controller "{name}" returned {count} in place of {len(outputs)} torques')
-        wrong = [motor for motor, value in zip(outputs, torques, strict=True) if not np.isfinite(value)]
-        if wrong:
-            raise _not_finite(name, wrong)
+        if not np.all(np.isfinite(torques)):
+            raise _not_finite(name, outputs, torques)
         last = getattr(controller, "last", None)
         record = last if isinstance(last, ChainSample) else ChainSample(y, torques, torques)
         self.kept[k].append((t, record.readings, record.requested, torques))
@@ -352,8 +350,9 @@ def _raised(name: str, error: Exception) -> LawFailure:
     return LawFailure(f'controller "{name}" raised {type(error).__name__}: {message}')
 
 
-def _not_finite(name: str, motors: Sequence[str]) -> LawFailure:
-    return LawFailure(f'controller "{name}" returned torques that are not finite, for {", ".join(motors)}')
+def _not_finite(name: str, outputs: Sequence[str], torques: Array) -> LawFailure:
+    wrong = [motor for motor, value in zip(outputs, torques, strict=True) if not np.isfinite(value)]
+    return LawFailure(f'controller "{name}" returned torques that are not finite, for {", ".join(wrong)}')
 
 
 def _controller(given: Any, sensors: tuple[str, ...], motors: tuple[str, ...]) -> Controller:
