@@ -105,7 +105,7 @@ class ReducedModel(NamedModel):
         InputError
             The model has balanced states.
         """
-        return self._frequencies([])
+        return self.held_frequencies([])
 
     @checked_arguments()
     def held_frequencies(self, motors: Sequence[str] | None = None) -> Array:
@@ -116,11 +116,8 @@ class ReducedModel(NamedModel):
         InputError
             The mechanism does not have a motor, or the model has balanced states.
         """
-        return self._frequencies(self.full.motor_joints(motors))
-
-    def _frequencies(self, joints: Sequence[str]) -> Array:
         equations = self.full.frozen.within(self.shapes)
-        rows = self.full.joint_rows(joints) @ self.shapes
+        rows = self.full.joint_rows(self.full.motor_joints(motors)) @ self.shapes
         free = kernel(rows, 1.0 / np.sqrt(np.diag(equations.mass)))
         return motions(equations.within(free), free).frequencies
 

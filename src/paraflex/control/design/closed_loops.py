@@ -293,19 +293,16 @@ def closed_loops(models: Mapping[str, Any], controller: Any, **settings: Any) ->
 
     if not models:
         raise InputError("there is no model", field="models", remedy="name one")
-    loops = {}
+    rows = {}
     for name, model in models.items():
         with within(f"models.{name}"):
-            loops[name] = closed_loop(model, controller, **settings)
-    rows = {
-        name: {
-            "stable": one.stable, "spectral_radius": one.spectral_radius, "frequency": one.slowest[0],
-            "damping": one.slowest[1], "rate": float(np.log(max(one.spectral_radius, 1e-300))) / one.plant.period,
-        }
-        for name, one in loops.items()
-    }  # fmt: skip
-    for name, one in loops.items():
+            one = closed_loop(model, controller, **settings)
         warn_if_unstable(one, f"with {name}")
+        frequency, damping = one.slowest
+        rows[name] = {
+            "stable": one.stable, "spectral_radius": one.spectral_radius, "frequency": frequency, "damping": damping,
+            "rate": float(np.log(max(one.spectral_radius, 1e-300))) / one.plant.period,
+        }  # fmt: skip
     return pd.DataFrame.from_dict(rows, orient="index").sort_values("spectral_radius", kind="stable")
 
 

@@ -249,8 +249,6 @@ class SampledController:
                 errors[i] -= reference(t)
         torques, state = self.started.step(self.chain_state.law, k, t, errors)
         self.chain_state = self.chain_state._replace(law=state, filtered=filtered)
-        if torques is None:
-            return None  # As a float array it would be NaN.
         wanted = real_numbers(torques)
         if wanted is None:
             return torques  # The loop reports the error.

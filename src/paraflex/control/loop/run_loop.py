@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -133,19 +133,19 @@ class Loop:
         self.names: list[str] = _names(self.controllers)
         check_whole(self.whole)
         self._start = start
-        self._plants: list[Plant] = []
+        self.plants: list[Plant] = []
         for name, each in zip(self.names, self.controllers, strict=True):
             try:
-                self._plants.append(plant(each))
-                each.start(self._plants[-1])
+                self.plants.append(plant(each))
+                each.start(self.plants[-1])
             except InputError as error:
                 raise error.within(name) from None
             except Exception as error:
                 raise _raised(name, error) from error
         # Sensors that the controllers read, in the order of the readings for `act`.
-        self.read: tuple[str, ...] = tuple(dict.fromkeys(name for plant in self._plants for name in plant.inputs))
-        self._inputs = [[self.read.index(name) for name in plant.inputs] for plant in self._plants]
-        self._outputs = [[motors.index(name) for name in plant.outputs] for plant in self._plants]
+        self.read: tuple[str, ...] = tuple(dict.fromkeys(name for plant in self.plants for name in plant.inputs))
+        self._inputs = [[self.read.index(name) for name in plant.inputs] for plant in self.plants]
+        self._outputs = [[motors.index(name) for name in plant.outputs] for plant in self.plants]
         self.period: float = min(each.period for each in self.controllers)
         self._every = [
             multiple_of(name, each.period, self.period) for name, each in zip(self.names, self.controllers, strict=True)
@@ -163,11 +163,6 @@ class Loop:
         self.inside: SampledLaw | None = None
 
     @property
-    def alone(self) -> tuple[Controller, Plant] | None:
-        """Controller and its plant if there is only one; else None."""
-        return (self.controllers[0], self._plants[0]) if len(self.controllers) == 1 else None
-
-    @property
     def failure(self) -> LawFailure | None:
         """Failure that ended a run in the compiled time loop; None without one."""
         law = self.inside
@@ -175,7 +170,7 @@ class Loop:
             return None
         if law.counts[WRONG] == RAISED:
             return _raised(self.names[0], exception_of(law, self.controllers[0]))
-        return _not_finite(self.names[0], self._plants[0].outputs, law.wanted[law.counts[SAMPLED]])
+        return _not_finite(self.names[0], self.plants[0].outputs, law.wanted[law.counts[SAMPLED]])
 
     @property
     def whole(self) -> list[str]:
@@ -232,14 +227,14 @@ class Loop:
         return self.acting.sum(axis=0)
 
     def _step(self, k: int, number: int, t: float, y: Array) -> Array:
-        name, controller, outputs = self.names[k], self.controllers[k], self._plants[k].outputs
+        name, controller, outputs = self.names[k], self.controllers[k], self.plants[k].outputs
         try:
             returned = controller.step(number, t, y)
         except Exception as error:
             raise _raised(name, error) from error
-        torques = None if returned is None else real_numbers(returned)
+        torques = real_numbers(returned)
         if torques is None:
-            kind = "complex numbers" if returned is not None and np.iscomplexobj(returned) else type(returned).__name__
+            kind = "complex numbers" if np.iscomplexobj(returned) else type(returned).__name__
             raise LawFailure(f'controller "{name}" returned {kind}, not torques')
         torques = np.atleast_1d(torques)
         if torques.shape != (len(outputs),):
@@ -252,8 +247,16 @@ class Loop:
         self.kept[k].append((t, record.readings, record.requested, torques))
         return torques
 
-    def keep_last(self) -> None:
-        """Give the controller in the compiled time loop its last sample, as it has outside of that loop."""
+    def note_inside(self, known: int, note: Callable[[float, Array], None]) -> None:
+        """Give the controller in the compiled time loop its last sample, and note the torques that acted there.
+
+        Parameters
+        ----------
+        known : int
+            Number of changes of torques that are known already.
+        note : callable
+            Function of a time [s] and of the torques (motors,) of all motors that act from then on.
+        """
         law, controller = self.inside, self.controllers[0]
         if law is None or not law.counts[SAMPLED]:
             return
@@ -261,22 +264,10 @@ class Loop:
         assert isinstance(controller, SampledController)
         last = ChainSample(law.readings[k].copy(), law.wanted[k].copy(), law.given[k].copy())
         controller.chain_state = controller.chain_state._replace(last=last)
-
-    def torques_acted(self, after: int) -> Iterator[tuple[float, Array]]:
-        """Yield times and torques (motors,) of all motors that began to act in the compiled time loop.
-
-        Parameters
-        ----------
-        after : int
-            Number of changes to skip, which are known already.
-        """
-        law = self.inside
-        if law is None:
-            return
-        for k in range(after, int(law.counts[ACTED])):
+        for k in range(known, int(law.counts[ACTED])):
             torques = np.zeros(law.held.size)
             torques[law.outputs] = law.given[k]
-            yield float(law.acted[k]), torques
+            note(float(law.acted[k]), torques)
 
     def records(self, units: Callable[[str], str]) -> tuple[ControllerRecord, ...]:
         """Return the record of each controller.
@@ -289,7 +280,7 @@ class Loop:
         return tuple(self._record(k, units) for k in range(len(self.controllers)))
 
     def _record(self, k: int, units: Callable[[str], str]) -> ControllerRecord:
-        controller, plant = self.controllers[k], self._plants[k]
+        controller, plant = self.controllers[k], self.plants[k]
         inside = self.inside
         if inside is None:
             t, readings, requested, applied = list(zip(*self.kept[k], strict=True)) or [()] * 4
@@ -320,13 +311,13 @@ class Loop:
         state = [_changing(each) for each in self.controllers]
         own = (self._next, self._due, self.acting, self.kept)
         # Plants, with tasks and mechanisms, are not copied.
-        memo = {id(value): value for plant in self._plants for value in (plant, *vars(plant).values())}
+        memo = {id(value): value for plant in self.plants for value in (plant, *vars(plant).values())}
         inside = None if self.inside is None else [array.copy() for array in self.inside]
         return copy.deepcopy((state, own), memo), inside
 
     def restore(self, saved: Any) -> None:
         """Return to a state that `saved` returned."""
-        memo = {id(value): value for plant in self._plants for value in (plant, *vars(plant).values())}
+        memo = {id(value): value for plant in self.plants for value in (plant, *vars(plant).values())}
         outside, inside = saved
         states, own = copy.deepcopy(outside, memo)
         self._next, self._due, self.acting, self.kept = own

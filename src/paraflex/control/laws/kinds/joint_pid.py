@@ -92,10 +92,9 @@ class JointPID(Law, kind="pid", title="PID of joints"):
 
         check_pairs(plant.inputs, plant.outputs)
         law = self._linear(plant.outputs, plant.period)
-        projector = None
-        if self.project and plant.task is not None:
-            projector = torque_projectors(required_effort(planned_motion(plant)), plant.outputs)
-        return replace(law, projector=projector)
+        if not self.project or plant.task is None:
+            return law
+        return replace(law, projector=torque_projectors(required_effort(planned_motion(plant)), plant.outputs))
 
     @checked_arguments()
     def sampled(self, period: float, mechanism: Mechanism, motors: Sequence[str] | None = None) -> DiscreteModel:
