@@ -26,7 +26,7 @@ from paraflex.errors import InputError, Moment, SingularPositionError, as_enum
 from paraflex.limits import solvable
 from paraflex.linear.coordinates import CoordinateChoice, Coordinates, FirstCoordinates, Variable
 from paraflex.linear.discrete import InputHold, Prediction, SampledModel, transitions
-from paraflex.linear.linearise import Chart, charted, linear_model, moving, nearest_sample
+from paraflex.linear.linearise import Chart, Ports, charted, linear_model, moving, nearest_sample
 from paraflex.linear.minimal import MinimalEquations
 from paraflex.linear.model import LinearModel
 from paraflex.linear.named import labelled, matrices_of
@@ -76,10 +76,12 @@ class VaryingModel:
         State-space matrices at the samples.
     nominal : Along
         States, inputs and outputs of the nominal motion.
-    chart : Chart
-        Candidate coordinates, and description of inputs and outputs.
+    coordinates : Coordinates
+        Candidate coordinates.
     chosen : CoordinateChoice
-        Minimal coordinates among the candidates, which are states.
+        Minimal coordinates among them, which are states.
+    ports : Ports
+        Description of inputs and outputs.
     modal : (array, array)
         Transformation to scaled modal states at the first sample, see `LinearModel.modal_states`.
     """
@@ -96,8 +98,9 @@ class VaryingModel:
     C: Array
     D: Array
     nominal: Along
-    chart: Chart
+    coordinates: Coordinates
     chosen: CoordinateChoice
+    ports: Ports
     modal: tuple[Array, Array]
 
     @checked_arguments()
@@ -114,11 +117,11 @@ class VaryingModel:
         InputError
             The run is of a mechanism with other bodies.
         """
-        found = moving(run, self.chart.ports.mode)
-        if not same_bodies(found.system, self.chart.coordinates.system):
+        found = moving(run, self.ports.mode)
+        if not same_bodies(found.system, self.coordinates.system):
             raise InputError("belongs to a mechanism with other bodies", field="run", value=found.system.mechanism.name,
                              remedy="give a run of the mechanism of this model")  # fmt: skip
-        return _along([found.point(k) for k in range(found.times.size)], self.chart, self.chosen)
+        return _along([found.point(k) for k in range(found.times.size)], self.coordinates, self.chosen, self.ports)
 
     @checked_arguments()
     @solvable("the sampled model")
@@ -230,8 +233,8 @@ def linearise_along(
     return VaryingModel(
         mechanism=first.mechanism, mode=first.mode, about=first.about, states=first.states, inputs=first.inputs,
         outputs=first.outputs, times=np.array([point.time for point in points]), A=np.array(A), B=np.array(B),
-        C=np.array(C), D=np.array(D), nominal=_along(points, chart, chosen), chart=chart,
-        chosen=chosen, modal=first.modal_states,
+        C=np.array(C), D=np.array(D), nominal=_along(points, chart.coordinates, chosen, chart.ports),
+        coordinates=chart.coordinates, chosen=chosen, ports=chart.ports, modal=first.modal_states,
     )  # fmt: skip
 
 
@@ -305,9 +308,8 @@ def _singular(minimal: MinimalEquations, names: Sequence[str]) -> SingularPositi
     )  # fmt: skip
 
 
-def _along(points: Sequence[MotionPoint], chart: Chart, chosen: CoordinateChoice) -> Along:
+def _along(points: Sequence[MotionPoint], coordinates: Coordinates, chosen: CoordinateChoice, ports: Ports) -> Along:
     """Return states, inputs and outputs at points of a motion."""
-    coordinates, ports, _ = chart
     mechanism = coordinates.system.mechanism
     t, q, v, a, multipliers, acting = (np.array(part) for part in zip(*points, strict=True))
     torques = acting[:, : len(mechanism.motors)]
