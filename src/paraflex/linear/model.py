@@ -18,7 +18,6 @@ from paraflex.dynamics.linearise import slowest, typical_square, undamped_modes
 from paraflex.dynamics.sensors import SensorRows
 from paraflex.dynamics.sparse import stiffness_diagonal
 from paraflex.dynamics.state_space import StateSpace
-from paraflex.errors import InputError
 from paraflex.linear.bases import kernel
 from paraflex.linear.coordinates import Variable
 from paraflex.linear.descriptor import poles_near, response_at
@@ -26,6 +25,7 @@ from paraflex.linear.minimal import MinimalEquations
 from paraflex.linear.motions import Motions, SecondOrder, driven_equations, modal_damping, motions
 from paraflex.linear.named import NamedModel, numbers_of
 from paraflex.linear.zeros import Vibrating, by_size, vibrating_zeros, zeros
+from paraflex.mechanism.quantities import all_listed
 
 # Admissible relative asymmetry of a stiffness matrix that is regarded as symmetric.
 _SYMMETRIC = 1e-7
@@ -238,11 +238,7 @@ class LinearModel(NamedModel):
         """
         joints = {motor.name: motor.joint for motor in self.minimal.system.mechanism.motors}
         names = [one.name for one in self.inputs if one.name in joints] if motors is None else motors
-        for name in names:
-            if name not in joints:
-                raise InputError(
-                    "is not a motor", field="motors", value=name, remedy="choose from " + ", ".join(joints)
-                )
+        all_listed(names, joints, "motors", "is not a motor")
         return [joints[name] for name in names]
 
     @checked_arguments()

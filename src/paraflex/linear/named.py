@@ -14,7 +14,7 @@ from paraflex.arguments import checked_arguments, numbers_in
 from paraflex.arrays import Array, Complex, Indices
 from paraflex.errors import InputError
 from paraflex.linear.coordinates import Variable
-from paraflex.mechanism.quantities import finite
+from paraflex.mechanism.quantities import all_listed, finite
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -138,9 +138,5 @@ def numbers_of(names: Sequence[str] | None, have: Sequence[Variable], what: str)
     known = [one.name for one in have]
     if names is None:
         return np.arange(len(known))
-    for name in names:
-        if name not in known:
-            raise InputError(
-                f"is not one of the {what}s", field=f"{what}s", value=name, remedy="choose from " + ", ".join(known)
-            )
+    all_listed(names, known, f"{what}s", f"is not one of the {what}s")
     return np.array([known.index(name) for name in names], dtype=int)
