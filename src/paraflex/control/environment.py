@@ -15,7 +15,7 @@ import numpy as np
 from paraflex.arguments import checked_arguments
 from paraflex.arrays import Array, Numbers
 from paraflex.control.loop.simulation import Simulation
-from paraflex.control.loop.together import by_name, checked_number, periods_in
+from paraflex.control.loop.together import by_name, checked_number, periods_in, real_numbers
 from paraflex.control.observations import WIDEST, Observer, observed_sensors
 from paraflex.dynamics import State
 from paraflex.dynamics.points import marker_position
@@ -170,7 +170,7 @@ class Environment(Env[Array, Numbers]):
             "mode": mode, "feed_forward": task is not None if feed_forward is None else feed_forward,
             "duration": duration, "start": start, "balanced": balanced, "method": method, "options": options,
         }  # fmt: skip
-        self._source, self._task, self._vary, self._reward = source, task, vary, reward
+        self._task, self._vary, self._reward = task, vary, reward
         self._accuracy, self._effort_weight, self._penalty = accuracy, effort_weight, penalty
         self.simulation: Simulation = Simulation(source, **self._settings)
         if task is None and start is None and not isinstance(source, Mechanism):
@@ -279,11 +279,8 @@ class Environment(Env[Array, Numbers]):
 
     def _cut(self, action: Any) -> Array:
         """Return an action clipped to the limits."""
-        try:
-            given = np.asarray(action, dtype=float)
-        except (TypeError, ValueError):
-            given = np.full(0, np.nan)
-        if given.shape != (len(self.motors),) or not np.all(np.isfinite(given)):
+        given = real_numbers(action)
+        if given is None or given.shape != (len(self.motors),) or not np.all(np.isfinite(given)):
             raise InputError(f"not {len(self.motors)} finite numbers", field="action", value=action,
                              remedy=f"give one from -1 to 1 for each of {', '.join(self.motors)}")  # fmt: skip
         return np.clip(given, -1.0, 1.0)

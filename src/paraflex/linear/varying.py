@@ -10,7 +10,7 @@ including the terms of Z' that `minimal` has at every sample.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, NamedTuple, TypeVar
@@ -260,24 +260,20 @@ def in_one_chart(
     coordinates, without = chart.coordinates, list[int]()
     chosen, tries = coordinates.choose(coordinates.at(points[0])), len(coordinates.measured) + _MORE
     while True:
-        found = _taken((linear_model(chart, point, chosen=chosen) for point in points), take)
-        if not isinstance(found, LinearModel):
+        first, found = None, []
+        for point in points:
+            model = linear_model(chart, point, chosen=chosen)
+            first = first or model
+            if not describes(model.minimal, first.minimal):
+                break
+            found.append(take(model))
+        else:
             return chosen, found
-        without += _given_up(found.minimal, coordinates)
+        # The model is beyond or near a singular position.
+        without += _given_up(model.minimal, coordinates)
         if not tries:
-            raise _singular(found.minimal, [one.name for one in coordinates.names(chosen)])
-        chosen, tries = coordinates.choose(found.minimal.tangents, without), tries - 1
-
-
-def _taken(models: Iterable[LinearModel], take: Callable[[LinearModel], T]) -> list[T] | LinearModel:
-    """Apply `take` to all models; if one is beyond or near a singular position, return the first such model instead."""
-    first, found = None, []
-    for model in models:
-        first = first or model
-        if not describes(model.minimal, first.minimal):
-            return model
-        found.append(take(model))
-    return found
+            raise _singular(model.minimal, [one.name for one in coordinates.names(chosen)])
+        chosen, tries = coordinates.choose(model.minimal.tangents, without), tries - 1
 
 
 def same_bodies(system: System, other: System) -> bool:
