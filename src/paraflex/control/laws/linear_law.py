@@ -52,8 +52,6 @@ class LinearLaw(StartedLaw):
         One for states that stay constant while a torque is limited, zero for others; zero by default.
     projector : (samples, outputs, outputs) array or None
         Projectors P by sample, the last one kept afterwards; None for the identity.
-    title : str
-        Short description of the law, if it is not that of its class.
     """
 
     A: Array
@@ -65,7 +63,6 @@ class LinearLaw(StartedLaw):
     holding: Array = field(default_factory=_zero)
     waiting: Array = field(default_factory=_zero)
     projector: Array | None = None
-    title: str = ""
 
     def __post_init__(self) -> None:
         (outputs, inputs), n = self.D.shape, len(self.A)

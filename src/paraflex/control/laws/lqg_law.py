@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
@@ -120,7 +120,7 @@ class LQGDesign(WithPoles):
         """Return the control law in its initial state, for `SampledController`."""
         return LQGLaw(self)
 
-    def in_run(self, plant: Plant | None = None) -> LinearLaw:
+    def in_run(self, plant: Plant | None = None) -> LQGInRun:
         """Return the control law with the states of `state_space`, for a run or, without a plant, for steps by hand.
 
         The estimate is propagated with the limited torques, and the integrals stay constant while any torque is
@@ -142,14 +142,26 @@ class LQGDesign(WithPoles):
                 raise InputError(f"the design is for {wanted:g} s", field=what, value=have,
                                  remedy=f"leave it out, or design for that {what}")  # fmt: skip
         n, rows = len(self.filter.A), len(self.regulator.integrated)
-        return LinearLaw(
+        return LQGInRun(
             *self.state_space,
             E=np.vstack([-self.filter.B, np.zeros((rows, len(self.outputs)))]),
             first=np.vstack([self.start, np.zeros((rows, len(self.inputs)))]),
             holding=0.0 * self.holding_torques if plant and plant.feed_forward else self.holding_torques,
             waiting=(np.arange(n + rows) >= n).astype(float),
-            title=f"LQG of {self.regulator.plant.own} states",
+            design=self,
         )
+
+
+@dataclass(frozen=True)
+class LQGInRun(LinearLaw):
+    """Linear law of an `LQGDesign`."""
+
+    design: LQGDesign = field(kw_only=True)
+
+    @property
+    def title(self) -> str:  # pyright: ignore[reportIncompatibleVariableOverride]
+        """Short description of the law, with the number of states of the model."""
+        return f"LQG of {self.design.regulator.plant.own} states"
 
 
 class LQGLaw:
@@ -192,7 +204,7 @@ class LQGLaw:
         integrated = len(self.design.regulator.integrated)
         return np.zeros(integrated) if self._state is None else self._state.x[len(self.design.start) :]
 
-    def start(self, plant: Plant) -> LinearLaw | None:
+    def start(self, plant: Plant) -> LQGInRun | None:
         """Reset the state, and return the law in a run: see `LQGDesign.in_run`; None if a subclass may step itself."""
         self._law, self._state = self.design.in_run(plant), None
         return self._law if type(self) is LQGLaw else None

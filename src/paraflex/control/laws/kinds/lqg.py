@@ -9,13 +9,13 @@ from typing import TYPE_CHECKING, ClassVar
 from paraflex.control.laws.controllers import Plant
 from paraflex.control.laws.estimators import quantisation_noise
 from paraflex.control.laws.law import Law, given
-from paraflex.control.laws.linear_law import LinearLaw
 from paraflex.control.loop.together import OPEN_LOOP, Numbers
 from paraflex.errors import InputError
 from paraflex.mechanism import Mechanism, mode_of_motors
 from paraflex.mechanism.quantities import all_known, finite, not_negative, positive
 
 if TYPE_CHECKING:
+    from paraflex.control.laws.lqg_law import LQGInRun
     from paraflex.linear import LinearModel
 
 _OWN_UNIT = "the unit of the sensor"
@@ -121,7 +121,7 @@ class DesignedLQG(Law, kind="lqg", title="LQG"):
             raise InputError("differ from those of effort", field="outputs", value=", ".join(outputs),
                              remedy="leave it out, or give the effort of each")  # fmt: skip
 
-    def start(self, plant: Plant) -> LinearLaw:
+    def start(self, plant: Plant) -> LQGInRun:
         """Design the controller, and return it in a run: see `Law.start`."""
         from paraflex.control.design.regulators import lqg
         from paraflex.linear import reduce
