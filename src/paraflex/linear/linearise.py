@@ -65,7 +65,7 @@ class Ports:
 
 
 class Chart(NamedTuple):
-    """What linear models along a motion have in common.
+    """Coordinates, inputs and outputs that linear models along a motion share.
 
     Attributes
     ----------
@@ -220,7 +220,7 @@ def charted(
     source: TrackingTask | TrackingRun | MotionRun, mode: str | ActuationMode | None, forces: Sequence[str],
     prescribed: Sequence[str], coordinates: FirstCoordinates | str,
 ) -> tuple[OperatingPoints, Chart]:  # fmt: skip
-    """Return a motion, and what linear models along it have in common."""
+    """Return a motion, and the chart of linear models along it."""
     task = source.task if isinstance(source, TrackingRun) else source
     mechanism = task.system.mechanism if isinstance(task, MotionRun) else task.mechanism
     ports = ports_of(mechanism, mode_of(source, mechanism, mode), forces, prescribed)
