@@ -47,7 +47,7 @@ def directly(model, s):
 
 
 def sparsely(model, s):
-    return response_at(model.minimal, model.rows, model.selected[0], s)
+    return response_at(model.minimal, model.rows, model.selected, s)
 
 
 # --- Choice of coordinates --------------------------------------------------------------------------------------------

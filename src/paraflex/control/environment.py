@@ -11,12 +11,11 @@ from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from paraflex.arguments import checked_arguments
-from paraflex.arrays import Array
+from paraflex.arrays import Array, Numbers
 from paraflex.control.loop.simulation import Simulation
-from paraflex.control.loop.together import by_name, checked_number, periods_in
+from paraflex.control.loop.together import by_name, checked_number, periods_in, real_numbers
 from paraflex.control.observations import WIDEST, Observer, observed_sensors
 from paraflex.dynamics import State
 from paraflex.dynamics.points import marker_position
@@ -50,7 +49,7 @@ REGISTERED: dict[str, tuple[str, dict[str, Any]]] = {
 }
 
 
-class Environment(Env[Array, NDArray[Any]]):
+class Environment(Env[Array, Numbers]):
     """Gymnasium environment of a mechanism, with motor torques as actions.
 
     An action a (motors,) applies the torques a x `limits` for one period, in addition to those of the plan if there is
@@ -171,7 +170,7 @@ class Environment(Env[Array, NDArray[Any]]):
             "mode": mode, "feed_forward": task is not None if feed_forward is None else feed_forward,
             "duration": duration, "start": start, "balanced": balanced, "method": method, "options": options,
         }  # fmt: skip
-        self._source, self._task, self._vary, self._reward = source, task, vary, reward
+        self._task, self._vary, self._reward = task, vary, reward
         self._accuracy, self._effort_weight, self._penalty = accuracy, effort_weight, penalty
         self.simulation: Simulation = Simulation(source, **self._settings)
         if task is None and start is None and not isinstance(source, Mechanism):
@@ -219,7 +218,7 @@ class Environment(Env[Array, NDArray[Any]]):
         self._seen = self._observe(0, readings, self.np_random)
         return self._seen.copy(), self._info(np.zeros(len(self.motors)))
 
-    def step(self, action: NDArray[Any]) -> tuple[Array, float, bool, bool, dict[str, Any]]:
+    def step(self, action: Numbers) -> tuple[Array, float, bool, bool, dict[str, Any]]:
         """Apply torques for one period; return observation, reward, terminated, truncated and `info`.
 
         `info` contains the "time" reached [s], the "torques" of the action [N m, N], with a plan the "deviation" of the
@@ -280,11 +279,8 @@ class Environment(Env[Array, NDArray[Any]]):
 
     def _cut(self, action: Any) -> Array:
         """Return an action clipped to the limits."""
-        try:
-            given = np.asarray(action, dtype=float)
-        except (TypeError, ValueError):
-            given = np.full(0, np.nan)
-        if given.shape != (len(self.motors),) or not np.all(np.isfinite(given)):
+        given = real_numbers(action)
+        if given is None or given.shape != (len(self.motors),) or not np.all(np.isfinite(given)):
             raise InputError(f"not {len(self.motors)} finite numbers", field="action", value=action,
                              remedy=f"give one from -1 to 1 for each of {', '.join(self.motors)}")  # fmt: skip
         return np.clip(given, -1.0, 1.0)

@@ -77,7 +77,9 @@ class Observer:
         self._changes = np.zeros((times.size, 0))
         self.names: tuple[str, ...] = names
         if task is not None:
-            now, *later = (_planned(task, mechanism, names, times + time) for time in (0.0, *ahead))
+            # After the end of the plan, the readings are those at its end.
+            motions = (task.plan.follow(np.minimum(times + time, task.motion.t[-1])) for time in (0.0, *ahead))
+            now, *later = (readings_of(motion, mechanism, names) for motion in motions)
             planned = [k for k, name in enumerate(names) if name in now]
             if errors:
                 self._planned[:, planned] = np.stack(list(now.values()), axis=1) if now else 0.0
@@ -129,12 +131,6 @@ def observed_sensors(given: Sequence[str] | None, simulation: Simulation) -> tup
     joints = encoders_of(mechanism, simulation.motors)
     axes = [] if effector is None else [axis for axis in ("x", "y") if axis in effector.coordinates]
     return tuple(dict.fromkeys([*joints, *axes]))
-
-
-def _planned(task: TrackingTask, mechanism: Mechanism, names: tuple[str, ...], times: Array) -> dict[str, Array]:
-    """Return planned readings (k,) at times (k,) by sensor; after the end of the plan, those at its end."""
-    motion = task.plan.follow(np.minimum(times, task.motion.t[-1]))
-    return readings_of(motion, mechanism, names)
 
 
 def _by_sensor(given: Mapping[str, float] | None, names: tuple[str, ...], field: str, otherwise: float) -> Array:

@@ -13,6 +13,7 @@ from paraflex.equilibria.result import Statics
 from paraflex.errors import InputError, IntegrationError, Moment, as_enum, suggestion
 from paraflex.integrators.between import COARSE
 from paraflex.mechanism import Mechanism
+from paraflex.mechanism.quantities import all_listed
 from paraflex.motion import MotionRun
 from paraflex.results.following import HEADLINE, ErrorSpan
 from paraflex.results.metrics import (
@@ -201,11 +202,7 @@ def check_smooth(names: Sequence[str]) -> None:
     InputError
         A metric is not differentiable, such as one that describes the integration.
     """
-    for name in names:
-        if name not in SMOOTH:
-            raise InputError(
-                "has no derivative", field="metrics", value=name, remedy=f"choose from {', '.join(SMOOTH)}"
-            )
+    all_listed(names, SMOOTH, "metrics", "has no derivative")
 
 
 def beyond_limits(runs: int) -> str:

@@ -78,13 +78,14 @@ def poses_along(
     SingularPositionError
         No coordinates describe the motion at all poses.
     """
-    motion, ports, chart = charted(source, mode, forces, prescribed, coordinates)
+    motion, chart = charted(source, mode, forces, prescribed, coordinates)
     far, unit = _lengths(source)
     samples = _evenly(far, count)
     still = np.zeros(motion.system.n)
     states = [State(float(motion.times[k]), _coordinates(source, k), still) for k in samples]
-    points = [resting_point(chart, state, ports.mode)[0] for state in [*states, *([] if pose is None else [pose])]]
-    models = in_one_chart(points, chart, ports, "a pose at rest", lambda model: model)[1]
+    states += [] if pose is None else [pose]
+    points = [resting_point(chart.coordinates, state, chart.ports.mode)[0] for state in states]
+    models = in_one_chart(points, chart._replace(about="a pose at rest"), lambda model: model)[1]
     return PosesAlong(far[samples], unit, tuple(models[:count]), None if pose is None else models[count])
 
 

@@ -2,15 +2,12 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
-
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
-from paraflex.arrays import Array
+from paraflex.arrays import Array, Indices
+from paraflex.dynamics.state_space import StateSpace
 from paraflex.errors import InputError
-from paraflex.linear.zeros import StateSpace
 
 # Hankel singular values below this fraction of the largest are lost in the rounding of the Gramians.
 _RESOLVED = float(np.sqrt(np.finfo(float).eps))
@@ -18,27 +15,7 @@ _RESOLVED = float(np.sqrt(np.finfo(float).eps))
 _STABLE = 1e-6
 
 
-class BalancedProjection(NamedTuple):
-    """Projection of a balanced truncation: x = right z and z = left x.
-
-    Attributes
-    ----------
-    left, right : (r, n) and (n, r) arrays
-        Left and right projection matrices.
-    hankel : (stable,) array
-        Hankel singular values of the stable part, descending, in units of outputs over inputs.
-    bound : float
-        Upper bound of the error's largest gain over all frequencies: twice the sum of the truncated values (Enns,
-        Glover 1984), with values lost in rounding replaced by the limit of their resolution.
-    """
-
-    left: Array
-    right: Array
-    hankel: Array
-    bound: float
-
-
-def balanced(system: StateSpace, count: int, low: float) -> BalancedProjection:
+def balanced(system: StateSpace, count: int, low: float) -> tuple[StateSpace, Array, float]:
     """Truncate the least controllable and observable states of the stable part.
 
     Parameters
@@ -49,6 +26,16 @@ def balanced(system: StateSpace, count: int, low: float) -> BalancedProjection:
         Number of states to retain, including those of the part that is not stable.
     low : float
         Typical low angular frequency [rad/s].
+
+    Returns
+    -------
+    StateSpace
+        Truncated system.
+    (stable,) array
+        Hankel singular values of the stable part, descending, in units of outputs over inputs.
+    float
+        Upper bound of the error's largest gain over all frequencies: twice the sum of the truncated values (Enns,
+        Glover 1984), with values lost in rounding replaced by the limit of their resolution.
 
     Raises
     ------
@@ -80,15 +67,14 @@ def balanced(system: StateSpace, count: int, low: float) -> BalancedProjection:
     U, hankel, V = scipy.linalg.svd(seen.T @ reached)
     kept = min(count - first, int(np.sum(hankel > 0.0)))
     root = np.sqrt(hankel[:kept])
-    return BalancedProjection(
-        left=np.vstack([whole[free], left[:neutral], (U[:, :kept] / root).T @ seen.T @ left[neutral:]]),
-        right=np.hstack([whole[:, free], right[:, :neutral], right[:, neutral:] @ reached @ (V[:kept].T / root)]),
-        hankel=hankel,
-        bound=2.0 * float(np.sum(np.maximum(hankel[kept:], _RESOLVED * hankel.max(initial=0.0)))),
-    )
+    # Projections z = left x and x = right z.
+    left = np.vstack([whole[free], left[:neutral], (U[:, :kept] / root).T @ seen.T @ left[neutral:]])
+    right = np.hstack([whole[:, free], right[:, :neutral], right[:, neutral:] @ reached @ (V[:kept].T / root)])
+    bound = 2.0 * float(np.sum(np.maximum(hankel[kept:], _RESOLVED * hankel.max(initial=0.0))))
+    return StateSpace(left @ system.A @ right, left @ system.B, system.C @ right, system.D), hankel, bound
 
 
-def _uncoupled(A: Array, low: float) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+def _uncoupled(A: Array, low: float) -> tuple[Indices, Indices]:
     """Return the states of undamped motions that are not coupled to other states, and all other states.
 
     Rigid motions are thus retained without a transformation, whose rounding errors would be visible at low frequencies,

@@ -6,11 +6,10 @@ from collections.abc import Sequence
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
+from paraflex.arrays import Array, Complex
 from paraflex.linear.model import LinearModel
 
-Complex = NDArray[np.complex128]
 # Number of candidate poles relative to that of branches: other poles may move between those of the branches.
 _CANDIDATES = 3
 # Modal assurance criterion and distance, relative to the largest pole, of two poles that are regarded as one.
@@ -56,7 +55,7 @@ def pole_branches(models: Sequence[LinearModel], held: Sequence[str] = (), count
     return out
 
 
-def _alike(model: LinearModel, first: Complex, second: Complex) -> NDArray[np.float64]:
+def _alike(model: LinearModel, first: Complex, second: Complex) -> Array:
     """Compute the modal assurance criterion (first, second) of shapes (n, k)."""
     mass = model.minimal.tangents.whole.mass
     product = np.abs(first.conj().T @ (mass @ second)) ** 2

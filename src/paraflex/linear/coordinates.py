@@ -12,14 +12,13 @@ from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from enum import Enum
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 from scipy.sparse import csr_matrix
 
-from paraflex.arrays import Array
+from paraflex.arrays import Array, Indices
 from paraflex.dynamics import System, joint_coordinate, material_angle
 from paraflex.dynamics.constraints import coordinate_kind
 from paraflex.dynamics.points import marker_place
@@ -45,13 +44,6 @@ class Variable(NamedTuple):
     unit: str
 
 
-def named_axes(states: Sequence[Variable], inputs: Sequence[Variable], outputs: Sequence[Variable]) -> dict[str, Any]:
-    """Return names and units of the dimensions state, state_of, input and output, for labelled arrays of matrices."""
-    named = {"state": states, "state_of": states, "input": inputs, "output": outputs}
-    names = {key: [one.name for one in values] for key, values in named.items()}
-    return names | {f"{key}_unit": (key, [one.unit for one in values]) for key, values in named.items()}
-
-
 class CoordinateChoice(NamedTuple):
     """Choice of minimal coordinates at a pose.
 
@@ -65,9 +57,9 @@ class CoordinateChoice(NamedTuple):
         Indices of the coordinates of bodies that are states.
     """
 
-    constraints: NDArray[np.int64]
-    joints: NDArray[np.int64]
-    bodies: NDArray[np.int64]
+    constraints: Indices
+    joints: Indices
+    bodies: Indices
 
     @property
     def freedoms(self) -> int:
@@ -93,7 +85,7 @@ class PointTangents(NamedTuple):
     whole: Tangents
     constraints: RowTangents
     joints: RowTangents
-    compliant: NDArray[np.int64]
+    compliant: Indices
     motors: csr_matrix
 
 
@@ -116,9 +108,9 @@ class RowTangents(NamedTuple):
     rate: csr_matrix
     second_place: csr_matrix
     second_rate: csr_matrix
-    number: NDArray[np.int64]
+    number: Indices
 
-    def taken(self, rows: NDArray[np.int64]) -> RowTangents:
+    def taken(self, rows: Indices) -> RowTangents:
         """Return the tangents of some of the rows."""
         return RowTangents(*(part[rows] for part in self[:4]), number=self.number[rows])
 
@@ -197,7 +189,7 @@ class Coordinates:
         return Tangency(with_coordinates(self.system, (*self.joints, *angle), pins))
 
     @cached_property
-    def _rows(self) -> tuple[dict[str, int], NDArray[np.int64]]:
+    def _rows(self) -> tuple[dict[str, int], Indices]:
         """Coordinate rows of the extended system by joint, and the indices of all its rows in the original system."""
         extended = self.tangency.system
         mechanism, names = extended.mechanism, {name: k for k, name in enumerate(extended.rows)}
@@ -206,7 +198,7 @@ class Coordinates:
         own = {name: k for k, name in enumerate(self.system.rows)}
         return rows, np.array([own.get(name, -1) for name in extended.rows], dtype=int)
 
-    def _rows_of(self, joints: Sequence[str]) -> NDArray[np.int64]:
+    def _rows_of(self, joints: Sequence[str]) -> Indices:
         return np.array([self._rows[0][joint] for joint in joints], dtype=int)
 
     def inertia(self, time: float, q: Array, joints: Sequence[str]) -> tuple[csr_matrix, csr_matrix, csr_matrix]:
@@ -226,7 +218,7 @@ class Coordinates:
         lam[number >= 0] = point.multipliers[number[number >= 0]]
         whole = self.tangency.at(point._replace(multipliers=lam))
 
-        def rows(selected: NDArray[np.int64]) -> RowTangents:
+        def rows(selected: Indices) -> RowTangents:
             at = np.searchsorted(whole.rows, selected)
             parts = (whole.jacobian, whole.rate, whole.second_place, whole.second_rate)
             return RowTangents(*(part[at] for part in parts), number=number[selected])

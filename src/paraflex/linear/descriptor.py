@@ -17,15 +17,13 @@ from typing import NamedTuple
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 from scipy.sparse import csr_matrix
 
-from paraflex.arrays import Array, Numbers
+from paraflex.arrays import Array, Complex, Indices, Numbers
 from paraflex.dynamics.sensors import SensorRows
 from paraflex.dynamics.sparse import Factor
 from paraflex.linear.minimal import MinimalEquations
 
-Complex = NDArray[np.complex128]
 # Seed of the starting vector of Arnoldi's method.
 _SEED = 0
 
@@ -89,7 +87,7 @@ class Descriptor:
         driven = scipy.sparse.eye(held, minimal.driven, minimal.driven - held)
         return csr_matrix(scipy.sparse.block_diag([minimal.forces, driven]))
 
-    def response(self, inputs: NDArray[np.int64]) -> SmallMotion:
+    def response(self, inputs: Indices) -> SmallMotion:
         """Compute the amplitudes of the motion for unit amplitudes of the given inputs."""
         return self._solved(self._inputs[:, inputs].toarray(), np.zeros((2, self.minimal.chosen.freedoms, inputs.size)))
 
@@ -128,7 +126,7 @@ class Descriptor:
         return SmallMotion(q, v, a, multipliers)
 
 
-def response_at(minimal: MinimalEquations, rows: SensorRows, inputs: NDArray[np.int64], s: complex) -> Complex:
+def response_at(minimal: MinimalEquations, rows: SensorRows, inputs: Indices, s: complex) -> Complex:
     """Compute the response (outputs, inputs) of sensors to the given inputs at s."""
     found = Descriptor(minimal, complex(s)).response(inputs)
     out = rows.q @ found.q + rows.v @ found.v + rows.a @ found.a + rows.multipliers @ found.multipliers

@@ -21,7 +21,8 @@ from scipy.interpolate import make_interp_spline
 from paraflex.arguments import checked_arguments
 from paraflex.arrays import Array
 from paraflex.errors import InputError
-from paraflex.linear.coordinates import Variable, named_axes
+from paraflex.linear.coordinates import Variable
+from paraflex.linear.named import labelled, matrices_of
 from paraflex.mechanism.quantities import known
 
 if TYPE_CHECKING:
@@ -124,15 +125,12 @@ class SampledModel:
 
     def to_xarray(self) -> xr.Dataset:
         """Return all matrices as a dataset labelled by time and by names of states, inputs and outputs, with units."""
-        import xarray as xr
-
         data = {
             "Phi": (("period", "state", "state_of"), self.Phi), "Gamma": (("period", "state", "input"), self.Gamma),
             "Gamma_next": (("period", "state", "input"), self.Gamma_next), "error": ("period", self.error),
-            "C": (("time", "output", "state_of"), self.C), "D": (("time", "output", "input"), self.D),
+            **matrices_of(self, "CD", ("time",)),
         }  # fmt: skip
-        axes = {**named_axes(self.states, self.inputs, self.outputs), "time": self.times, "period": self.times[:-1]}
-        return xr.Dataset(data, coords=axes, attrs={"hold": self.hold.value})
+        return labelled(self, data, {"hold": self.hold.value}, time=self.times, period=self.times[:-1])
 
 
 def _by_name(given: Any, variables: Sequence[Variable], field: str, shape: tuple[int, ...]) -> Array:

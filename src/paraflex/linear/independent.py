@@ -11,16 +11,14 @@ from __future__ import annotations
 import heapq
 from collections.abc import Iterable, Sequence
 from itertools import pairwise
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 from scipy.sparse import csr_matrix
 
-from paraflex.arrays import Array
+from paraflex.arrays import Array, Indices, Numbers
 
-Numbers = NDArray[np.int64]
 # A row of unit norm is dependent if its part independent of other rows is not larger than this.
 DEPENDENT = 1e-8
 # Smallest pivot relative to the largest entry of its row.
@@ -42,8 +40,8 @@ class Independent(NamedTuple):
         Indices of as many columns, ascending, in which the rows form a regular matrix.
     """
 
-    groups: tuple[Numbers, ...]
-    columns: Numbers
+    groups: tuple[Indices, ...]
+    columns: Indices
 
 
 def independent_dense(groups: Sequence[csr_matrix], weights: Array) -> Independent:
@@ -98,7 +96,7 @@ def unit_rows(rows: Array) -> Array:
     return rows / sizes(rows, 1)
 
 
-def sizes(matrix: NDArray[Any], axis: int) -> Array:
+def sizes(matrix: Numbers, axis: int) -> Array:
     """Return the norms of a matrix' rows (rows, 1), with axis 1, or columns (1, columns), with axis 0; 1 if zero."""
     size = np.linalg.norm(matrix, axis=axis, keepdims=True)
     return np.where(size > 0.0, size, 1.0)

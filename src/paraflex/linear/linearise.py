@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import scipy
@@ -62,6 +62,24 @@ class Ports:
     forces: tuple[PointRef, ...]
     prescribed: tuple[str, ...]
     sensors: tuple[Sensor, ...]
+
+
+class Chart(NamedTuple):
+    """Coordinates, inputs and outputs that linear models along a motion share.
+
+    Attributes
+    ----------
+    coordinates : Coordinates
+        Candidate coordinates.
+    ports : Ports
+        Inputs and outputs.
+    about : str
+        Kind of operating point, see `LinearModel.about`.
+    """
+
+    coordinates: Coordinates
+    ports: Ports
+    about: str
 
 
 @checked_arguments()
@@ -123,49 +141,33 @@ def linearise(
     SingularPositionError
         The position is singular, so that no coordinates describe the motion.
     """
-    return linear_model(
-        *operating_point(
-            source, mode=mode, at=at, assembly=assembly, start=start, balanced=balanced, forces=forces,
-            prescribed=prescribed, coordinates=coordinates,
-        )
-    )  # fmt: skip
-
-
-class OperatingPoint(NamedTuple):
-    """Arguments of `linear_model` without the choice of coordinates: operating point, inputs and outputs."""
-
-    coordinates: Coordinates
-    point: MotionPoint
-    ports: Ports
-    about: str
-    unbalanced: float = 0.0
+    pose = {"at": at, "assembly": assembly, "start": start, "balanced": balanced or None}
+    return linear_model(*operating_point(source, mode, forces, prescribed, coordinates, **pose))
 
 
 def operating_point(
     source: Mechanism | ModelWithPaths | TrackingTask | TrackingRun | MotionRun,
-    *,
     mode: str | ActuationMode | None = None,
-    at: float | None = None,
-    assembly: str | None = None,
-    start: Start | State | None = None,
-    balanced: bool = False,
     forces: Sequence[str] = (),
     prescribed: Sequence[str] = (),
     coordinates: FirstCoordinates | str = FirstCoordinates.MOTORS,
-) -> OperatingPoint:
-    """Return the operating point, inputs and outputs of a linear model: see `linearise`."""
+    **pose: Any,
+) -> tuple[Chart, MotionPoint, float]:
+    """Return the first arguments of `linear_model` for those of `linearise`.
+
+    Arguments of `linearise` that are not named here are those of `pose`, None where they are not given.
+    """
     moves = isinstance(source, TrackingTask | TrackingRun | MotionRun)
-    others = {"assembly": assembly, "start": start, "balanced": balanced or None} if moves else {"at": at}
-    for name, value in others.items():
-        if value is not None:
+    at, assembly, start, balanced = (pose.get(name) for name in ("at", "assembly", "start", "balanced"))
+    for name in ("assembly", "start", "balanced") if moves else ("at",):
+        if (value := pose.get(name)) is not None:
             raise InputError(
                 f"has no meaning for a {'motion' if moves else 'pose at rest'}", field=name, value=value,
                 remedy="leave it out, or give the mechanism" if moves else "leave it out, or give a plan or a run",
             )  # fmt: skip
     if moves:
-        motion, ports, chart = charted(source, mode, forces, prescribed, coordinates)
-        point = motion.point(0 if at is None else nearest_sample(motion.times, at))
-        return OperatingPoint(chart, point, ports, motion.about)
+        motion, chart = charted(source, mode, forces, prescribed, coordinates)
+        return chart, motion.point(0 if at is None else nearest_sample(motion.times, at)), 0.0
     mechanism = Mechanism.from_source(source)
     chosen = mode_of(source, mechanism, mode)
     ports = ports_of(mechanism, chosen, forces, prescribed)
@@ -175,21 +177,15 @@ def operating_point(
     if balanced:
         joints = [motor.joint for motor in mechanism.motors if motor.name in chosen.motors]
         state = static_equilibrium(system, state, list(dict.fromkeys(joints)))
-    chart = coordinates_of(system, ports.prescribed, as_enum(FirstCoordinates, coordinates, "coordinates"))
-    point, unbalanced = resting_point(chart, state, chosen)
-    return OperatingPoint(chart, point, ports, "static equilibrium" if balanced else "a pose at rest", unbalanced)
+    own = coordinates_of(system, ports.prescribed, as_enum(FirstCoordinates, coordinates, "coordinates"))
+    return Chart(own, ports, "static equilibrium" if balanced else "a pose at rest"), *resting_point(own, state, chosen)
 
 
 def linear_model(
-    coordinates: Coordinates,
-    point: MotionPoint,
-    ports: Ports,
-    about: str,
-    unbalanced: float = 0.0,
-    *,
-    chosen: CoordinateChoice | None = None,
+    chart: Chart, point: MotionPoint, unbalanced: float = 0.0, *, chosen: CoordinateChoice | None = None
 ) -> LinearModel:
     """Linearise at an operating point, in the given minimal coordinates or, by default, in those chosen there."""
+    coordinates, ports, about = chart
     system = coordinates.system
     mechanism, tangents = system.mechanism, coordinates.at(point)
     chosen = coordinates.choose(tangents) if chosen is None else chosen
@@ -216,21 +212,21 @@ def linear_model(
         outputs=tuple(Variable(sensor.name, mechanism.sensor_unit(sensor)) for sensor in ports.sensors),
         minimal=minimal,
         rows=rows,
-        selected=(np.arange(len(inputs)), np.arange(len(ports.sensors))),
+        selected=np.arange(len(inputs)),
     )
 
 
 def charted(
     source: TrackingTask | TrackingRun | MotionRun, mode: str | ActuationMode | None, forces: Sequence[str],
     prescribed: Sequence[str], coordinates: FirstCoordinates | str,
-) -> tuple[OperatingPoints, Ports, Coordinates]:  # fmt: skip
-    """Return a motion, the inputs and outputs of linear models along it, and their candidate coordinates."""
+) -> tuple[OperatingPoints, Chart]:  # fmt: skip
+    """Return a motion, and the chart of linear models along it."""
     task = source.task if isinstance(source, TrackingRun) else source
     mechanism = task.system.mechanism if isinstance(task, MotionRun) else task.mechanism
     ports = ports_of(mechanism, mode_of(source, mechanism, mode), forces, prescribed)
     motion = moving(source, ports.mode)
     first = as_enum(FirstCoordinates, coordinates, "coordinates")
-    return motion, ports, coordinates_of(motion.system, ports.prescribed, first)
+    return motion, Chart(coordinates_of(motion.system, ports.prescribed, first), ports, motion.about)
 
 
 def mode_of(source: object, mechanism: Mechanism, mode: str | ActuationMode | None) -> ActuationMode:

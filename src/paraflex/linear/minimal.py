@@ -19,10 +19,9 @@ from typing import NamedTuple
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 from scipy.sparse import csr_matrix
 
-from paraflex.arrays import Array
+from paraflex.arrays import Array, Indices
 from paraflex.dynamics import System
 from paraflex.dynamics.sparse import Factor
 from paraflex.dynamics.tangents import MotionPoint
@@ -85,7 +84,7 @@ class MinimalEquations:
     chosen: CoordinateChoice
     scale: Array
     forces: csr_matrix
-    motors: NDArray[np.int64]
+    motors: Indices
     driven: int
 
     @cached_property
@@ -146,7 +145,7 @@ class MinimalEquations:
         return int(np.argmax(part)) if part.size else None
 
     @cached_property
-    def _dependent(self) -> NDArray[np.int64]:
+    def _dependent(self) -> Indices:
         return np.setdiff1d(np.arange(self.system.n), self.chosen.bodies)
 
     def coordinates(self, constraints: Array, y: Array) -> Array:

@@ -2,32 +2,31 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
 import scipy
-from numpy.typing import ArrayLike, NDArray
 from scipy.sparse import csr_matrix
 
 from paraflex.arguments import checked_arguments
-from paraflex.arrays import Array
+from paraflex.arrays import Array, Complex, Indices
 from paraflex.dynamics.joint_coordinates import joint_coordinate
 from paraflex.dynamics.linearise import slowest, typical_square, undamped_modes
 from paraflex.dynamics.sensors import SensorRows
 from paraflex.dynamics.sparse import stiffness_diagonal
-from paraflex.errors import InputError
+from paraflex.dynamics.state_space import StateSpace
 from paraflex.linear.bases import kernel
 from paraflex.linear.coordinates import Variable
 from paraflex.linear.descriptor import poles_near, response_at
 from paraflex.linear.minimal import MinimalEquations
 from paraflex.linear.motions import Motions, SecondOrder, driven_equations, modal_damping, motions
-from paraflex.linear.named import NamedModel, not_at_poles, numbers_of, places_in_s
-from paraflex.linear.zeros import StateSpace, Vibrating, by_size, vibrating_zeros, zeros
+from paraflex.linear.named import NamedModel, numbers_of
+from paraflex.linear.zeros import Vibrating, by_size, vibrating_zeros, zeros
+from paraflex.mechanism.quantities import all_listed
 
-Complex = NDArray[np.complex128]
 # Admissible relative asymmetry of a stiffness matrix that is regarded as symmetric.
 _SYMMETRIC = 1e-7
 # Sparse matrices are faster than dense ones with more degrees of freedom.
@@ -56,9 +55,9 @@ class LinearModel(NamedModel):
     minimal : MinimalEquations
         Linearised equations in minimal coordinates.
     rows : SensorRows
-        Derivatives of the sensor readings with respect to the motion.
-    selected : (inputs, outputs) tuple of arrays of int
-        Indices of the model's inputs in `minimal` and of its outputs in `rows`.
+        Derivatives of the outputs, which are sensor readings, with respect to the motion.
+    selected : array of int
+        Indices of the model's inputs in `minimal`.
     """
 
     mechanism: str
@@ -70,7 +69,7 @@ class LinearModel(NamedModel):
     outputs: tuple[Variable, ...]
     minimal: MinimalEquations
     rows: SensorRows
-    selected: tuple[NDArray[np.int64], NDArray[np.int64]]
+    selected: Indices
 
     def __repr__(self) -> str:
         return f"LinearModel({self.title}: {len(self.states)} states)"
@@ -91,47 +90,24 @@ class LinearModel(NamedModel):
         return self.minimal.point.at_rest
 
     @cached_property
-    def A(self) -> Array:
-        """State matrix (2f, 2f)."""
-        second, f = self.minimal.changes.second, len(self.states) // 2
-        return np.vstack([np.eye(f, 2 * f, f), second[:, : 2 * f]])
-
-    @cached_property
-    def B(self) -> Array:
-        """Input matrix (2f, inputs)."""
-        second = self.minimal.changes.second[:, len(self.states) :][:, self.selected[0]]
-        return np.vstack([np.zeros_like(second), second])
-
-    @cached_property
-    def C(self) -> Array:
-        """Output matrix (outputs, 2f)."""
-        return self._outputs[0]
-
-    @cached_property
-    def D(self) -> Array:
-        """Feed-through matrix (outputs, inputs), of accelerations, strains and forces."""
-        return self._outputs[1]
-
-    @property
     def state_space(self) -> StateSpace:
         """State-space matrices A, B, C and D."""
-        return StateSpace(self.A, self.B, self.C, self.D)
-
-    @cached_property
-    def _outputs(self) -> tuple[Array, Array]:
-        changes, n = self.minimal.changes, len(self.states)
-        rows = SensorRows(*(part[self.selected[1]] for part in self.rows))
-        whole = rows.a @ changes.a + rows.multipliers @ changes.multipliers
-        motors = self.minimal.motors
-        whole[:, n : n + motors.size] += rows.torques.toarray()[:, motors]
-        return whole[:, :n] + rows.q @ changes.q + rows.v @ changes.v, whole[:, n:][:, self.selected[0]]
+        changes, rows, motors, n = self.minimal.changes, self.rows, self.minimal.motors, len(self.states)
+        outputs = rows.a @ changes.a + rows.multipliers @ changes.multipliers
+        outputs[:, n : n + motors.size] += rows.torques.toarray()[:, motors]
+        forced = changes.second[:, n:][:, self.selected]
+        return StateSpace(
+            A=np.vstack([np.eye(n // 2, n, n // 2), changes.second[:, :n]]),
+            B=np.vstack([np.zeros_like(forced), forced]),
+            C=outputs[:, :n] + rows.q @ changes.q + rows.v @ changes.v,
+            D=outputs[:, n:][:, self.selected],
+        )
 
     @property
     def place_outputs(self) -> Array:
         """Output matrix (outputs, f) of the coordinates y, without accelerations, constraint forces and torques."""
         changes, f = self.minimal.changes, len(self.states) // 2
-        rows = SensorRows(*(part[self.selected[1]] for part in self.rows))
-        return rows.q @ changes.q[:, :f] + rows.v @ changes.v[:, :f]
+        return self.rows.q @ changes.q[:, :f] + self.rows.v @ changes.v[:, :f]
 
     # --- Properties ---------------------------------------------------------------------------------------------------
 
@@ -262,11 +238,7 @@ class LinearModel(NamedModel):
         """
         joints = {motor.name: motor.joint for motor in self.minimal.system.mechanism.motors}
         names = [one.name for one in self.inputs if one.name in joints] if motors is None else motors
-        for name in names:
-            if name not in joints:
-                raise InputError(
-                    "is not a motor", field="motors", value=name, remedy="choose from " + ", ".join(joints)
-                )
+        all_listed(names, joints, "motors", "is not a motor")
         return [joints[name] for name in names]
 
     @checked_arguments()
@@ -363,44 +335,19 @@ class LinearModel(NamedModel):
     @property
     def _displacements(self) -> Array | None:
         """Output matrix (outputs, f) of y, or of one derivative of y per output; None if an output is more general."""
-        rows = SensorRows(*(part[self.selected[1]] for part in self.rows))
+        rows = self.rows
         parts = [np.asarray(part @ self.minimal.directions) for part in (rows.q, rows.v, rows.a)]
         mixed = np.sum([np.any(part, axis=1) for part in parts], axis=0) != 1
         if np.any(mixed) or rows.multipliers.nnz or rows.torques.nnz or self.minimal.driven:
             return None
         return np.sum(parts, axis=0)
 
-    @checked_arguments()
-    def frequency_response(self, frequencies: ArrayLike) -> Complex:
-        """Compute the frequency response C (s - A)^-1 B + D (k, outputs, inputs).
-
-        With more than 200 degrees of freedom it is computed from sparse equations at each frequency, without A.
-
-        Parameters
-        ----------
-        frequencies : (k,) array
-            Angular frequencies omega of s = i omega [rad/s]; complex numbers are values of s.
-
-        Raises
-        ------
-        InputError
-            A value of s is a pole, where the response is infinite.
-        """
-        points = places_in_s(frequencies)
-        out = np.empty((points.size, len(self.outputs), len(self.inputs)), dtype=complex)
+    @property
+    def _response(self) -> Callable[[complex], Complex]:
+        """Response as a function of s: of a large model from sparse equations at each s, without A."""
         if self._is_large:
-            rows = SensorRows(*(part[self.selected[1]] for part in self.rows))
-            for k, s in enumerate(points):
-                with not_at_poles(s):
-                    out[k] = response_at(self.minimal, rows, self.selected[0], s)
-            return out
-        A, B, C, D = self.scaled
-        upper, basis = scipy.linalg.schur(A, output="complex")
-        inputs, outputs, eye = basis.conj().T @ B, C @ basis, np.eye(len(A))
-        for k, s in enumerate(points):
-            with not_at_poles(s):
-                out[k] = outputs @ scipy.linalg.solve_triangular(s * eye - upper, inputs) + D
-        return out
+            return partial(response_at, self.minimal, self.rows, self.selected)
+        return self.scaled.triangular().at
 
     @property
     def _is_large(self) -> bool:
@@ -418,7 +365,8 @@ class LinearModel(NamedModel):
             self,
             inputs=tuple(self.inputs[k] for k in chosen[0]),
             outputs=tuple(self.outputs[k] for k in chosen[1]),
-            selected=(self.selected[0][chosen[0]], self.selected[1][chosen[1]]),
+            rows=SensorRows(*(part[chosen[1]] for part in self.rows)),
+            selected=self.selected[chosen[0]],
         )
 
     @property

@@ -6,12 +6,10 @@ from typing import NamedTuple
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
-from paraflex.arrays import Array
+from paraflex.arrays import Array, Complex, Indices
 from paraflex.dynamics.linearise import undamped_modes
 
-Complex = NDArray[np.complex128]
 # Modal damping below this fraction of the largest is rounding.
 _ROUNDING = 1e-13
 
@@ -55,9 +53,7 @@ class SecondOrder(NamedTuple):
         return SecondOrder(mass, damping, stiffness, self.typical, self.vibrating)
 
 
-def driven_equations(
-    mass: Array, damping: Array, stiffness: Array, driven: NDArray[np.int64]
-) -> tuple[Array, Array, Array]:
+def driven_equations(mass: Array, damping: Array, stiffness: Array, driven: Indices) -> tuple[Array, Array, Array]:
     """Return the equations (f, f) of a system whose driven coordinates move independently of the others.
 
     With y = psi y_d + x and the static shapes psi of the driven coordinates, x obeys M x'' + D x' + K x = -D psi y_d'
@@ -117,7 +113,7 @@ def motions(equations: SecondOrder, directions: Array) -> Motions:
     )
 
 
-def _first_order(omega: Array, stiffness: Array, damping: Array, kept: NDArray[np.intp]) -> tuple[Complex, Complex]:
+def _first_order(omega: Array, stiffness: Array, damping: Array, kept: Indices) -> tuple[Complex, Complex]:
     """Compute the poles (2 kept,) of eta'' + damping eta' + stiffness eta = 0 and their shapes eta (k, 2 kept).
 
     The states are omega eta and eta', which are of equal scale.

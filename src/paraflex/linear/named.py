@@ -1,27 +1,76 @@
-"""Base class of linear models with named variables: selection by name, export to SciPy, python-control and xarray."""
+"""Base class of linear models with named variables: responses, export to SciPy, python-control and xarray."""
 
 from __future__ import annotations
 
 import importlib
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import scipy
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from paraflex.arguments import numbers_in
+from paraflex.arguments import checked_arguments, numbers_in
+from paraflex.arrays import Array, Complex, Indices
 from paraflex.errors import InputError, optional_package
-from paraflex.linear.coordinates import Variable, named_axes
-from paraflex.mechanism.quantities import finite
+from paraflex.linear.coordinates import Variable
+from paraflex.mechanism.quantities import all_listed, finite
 
 if TYPE_CHECKING:
     import xarray as xr
 
 
 class NamedModel:
-    """Linear model with named states, inputs and outputs: export to SciPy, python-control and xarray."""
+    """Linear model with named states, inputs and outputs: responses, export to SciPy, python-control and xarray."""
+
+    @property
+    def A(self: Any) -> Array:
+        """State matrix (states, states)."""
+        return self.state_space.A
+
+    @property
+    def B(self: Any) -> Array:
+        """Input matrix (states, inputs)."""
+        return self.state_space.B
+
+    @property
+    def C(self: Any) -> Array:
+        """Output matrix (outputs, states)."""
+        return self.state_space.C
+
+    @property
+    def D(self: Any) -> Array:
+        """Feed-through matrix (outputs, inputs), of accelerations, strains and forces."""
+        return self.state_space.D
+
+    @checked_arguments()
+    def frequency_response(self: Any, frequencies: ArrayLike) -> Complex:
+        """Compute the frequency response C (s - A)^-1 B + D (k, outputs, inputs).
+
+        For a full-order model with more than 200 degrees of freedom it is computed from sparse equations at each
+        frequency, without A.
+
+        Parameters
+        ----------
+        frequencies : (k,) array
+            Angular frequencies omega of s = i omega [rad/s]; complex numbers are values of s.
+
+        Raises
+        ------
+        InputError
+            A value of s is a pole, where the response is infinite.
+        """
+        points, response = places_in_s(frequencies), self._response
+        out = np.empty((points.size, len(self.outputs), len(self.inputs)), dtype=complex)
+        for k, s in enumerate(points.tolist()):
+            try:
+                out[k] = response(s)
+            except np.linalg.LinAlgError:
+                raise InputError(
+                    "is a pole of the model, where its response is infinite", field="frequencies",
+                    value=s.imag if s.real == 0.0 else s, remedy="leave it out, or take one beside it",
+                ) from None  # fmt: skip
+        return out
 
     def to_scipy(self: Any) -> scipy.signal.StateSpace:
         """Return the model as a `scipy.signal.StateSpace`."""
@@ -43,38 +92,30 @@ class NamedModel:
 
     def to_xarray(self: Any) -> xr.Dataset:
         """Return A, B, C and D as a dataset labelled by the names of states, inputs and outputs, with units."""
-        import xarray as xr
-
-        dimensions = {
-            "A": ("state", "state_of"), "B": ("state", "input"), "C": ("output", "state_of"), "D": ("output", "input"),
-        }  # fmt: skip
-        data = {key: (dimensions[key], values) for key, values in self.state_space._asdict().items()}
-        return xr.Dataset(data, coords=named_axes(self.states, self.inputs, self.outputs), attrs=self._attributes)
+        return labelled(self, matrices_of(self), self._attributes)
 
 
-def places_in_s(frequencies: ArrayLike, field: str = "frequencies") -> NDArray[np.complex128]:
+def matrices_of(model: Any, names: str = "ABCD", first: Sequence[str] = ()) -> dict[str, Any]:
+    """Return matrices of a model by name, each with its dimensions, of which `first` precede those of the matrix."""
+    axes = {"A": ("state", "state_of"), "B": ("state", "input"), "C": ("output", "state_of"), "D": ("output", "input")}
+    return {name: ((*first, *axes[name]), getattr(model, name)) for name in names}
+
+
+def labelled(model: Any, data: Mapping[str, Any], attrs: Mapping[str, Any], **axes: Any) -> xr.Dataset:
+    """Return arrays of a model as a dataset labelled by the names of states, inputs and outputs, with units."""
+    import xarray as xr
+
+    named = {"state": model.states, "state_of": model.states, "input": model.inputs, "output": model.outputs}
+    names = {key: [one.name for one in values] for key, values in named.items()}
+    units = {f"{key}_unit": (key, [one.unit for one in values]) for key, values in named.items()}
+    return xr.Dataset(data, coords=names | units | axes, attrs=attrs)
+
+
+def places_in_s(frequencies: ArrayLike, field: str = "frequencies") -> Complex:
     """Return s = i omega of finite angular frequencies [rad/s]; complex numbers are values of s already."""
     given = np.atleast_1d(numbers_in(frequencies, field, "biufc"))
     finite(given.ravel().tolist(), field)
     return np.asarray(given if np.iscomplexobj(given) else 1j * given, dtype=complex)
-
-
-@contextmanager
-def not_at_poles(s: complex) -> Iterator[None]:
-    """Convert the error of a singular matrix at a value of s into an `InputError`.
-
-    Raises
-    ------
-    InputError
-        The response is infinite at s, because s is a pole.
-    """
-    try:
-        yield
-    except np.linalg.LinAlgError:
-        raise InputError(
-            "is a pole of the model, where its response is infinite", field="frequencies",
-            value=float(s.imag) if s.real == 0.0 else complex(s), remedy="leave it out, or take one beside it",
-        ) from None  # fmt: skip
 
 
 def plain_name(name: str) -> str:
@@ -82,7 +123,7 @@ def plain_name(name: str) -> str:
     return "".join(letter if letter.isalnum() or letter == "_" else "_" for letter in name)
 
 
-def numbers_of(names: Sequence[str] | None, have: Sequence[Variable], what: str) -> NDArray[np.int64]:
+def numbers_of(names: Sequence[str] | None, have: Sequence[Variable], what: str) -> Indices:
     """Return the indices of variables by name, by default of all.
 
     Raises
@@ -93,9 +134,5 @@ def numbers_of(names: Sequence[str] | None, have: Sequence[Variable], what: str)
     known = [one.name for one in have]
     if names is None:
         return np.arange(len(known))
-    for name in names:
-        if name not in known:
-            raise InputError(
-                f"is not one of the {what}s", field=f"{what}s", value=name, remedy="choose from " + ", ".join(known)
-            )
+    all_listed(names, known, f"{what}s", f"is not one of the {what}s")
     return np.array([known.index(name) for name in names], dtype=int)

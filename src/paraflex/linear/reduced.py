@@ -9,19 +9,18 @@ from typing import Any
 
 import numpy as np
 import scipy
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from paraflex.arguments import checked_arguments
-from paraflex.arrays import Array
+from paraflex.arrays import Array, Complex
+from paraflex.dynamics.state_space import StateSpace
 from paraflex.errors import InputError
 from paraflex.linear.bases import kernel
 from paraflex.linear.coordinates import Variable
 from paraflex.linear.model import LinearModel
 from paraflex.linear.motions import motions
-from paraflex.linear.named import NamedModel, not_at_poles, numbers_of, places_in_s
-from paraflex.linear.zeros import StateSpace, by_size, zeros
-
-Complex = NDArray[np.complex128]
+from paraflex.linear.named import NamedModel, numbers_of
+from paraflex.linear.zeros import by_size, zeros
 
 
 class ReductionMethod(Enum):
@@ -82,26 +81,6 @@ class ReducedModel(NamedModel):
         return self.full.outputs
 
     @property
-    def A(self) -> Array:
-        """State matrix (states, states)."""
-        return self.state_space.A
-
-    @property
-    def B(self) -> Array:
-        """Input matrix (states, inputs)."""
-        return self.state_space.B
-
-    @property
-    def C(self) -> Array:
-        """Output matrix (outputs, states)."""
-        return self.state_space.C
-
-    @property
-    def D(self) -> Array:
-        """Feed-through matrix (outputs, inputs)."""
-        return self.state_space.D
-
-    @property
     def shapes(self) -> Array:
         """Reduced basis (f, k).
 
@@ -126,7 +105,7 @@ class ReducedModel(NamedModel):
         InputError
             The model has balanced states.
         """
-        return self._frequencies([])
+        return self.held_frequencies([])
 
     @checked_arguments()
     def held_frequencies(self, motors: Sequence[str] | None = None) -> Array:
@@ -137,11 +116,8 @@ class ReducedModel(NamedModel):
         InputError
             The mechanism does not have a motor, or the model has balanced states.
         """
-        return self._frequencies(self.full.motor_joints(motors))
-
-    def _frequencies(self, joints: Sequence[str]) -> Array:
         equations = self.full.frozen.within(self.shapes)
-        rows = self.full.joint_rows(joints) @ self.shapes
+        rows = self.full.joint_rows(self.full.motor_joints(motors)) @ self.shapes
         free = kernel(rows, 1.0 / np.sqrt(np.diag(equations.mass)))
         return motions(equations.within(free), free).frequencies
 
@@ -157,14 +133,8 @@ class ReducedModel(NamedModel):
         B, C = self.B[:, columns] / size[:, None], self.C[rows] * size
         return zeros(StateSpace(scaled, B, C, self.D[np.ix_(rows, columns)]), 0.7 * self.full.low_frequency)
 
-    @checked_arguments()
-    def frequency_response(self, frequencies: ArrayLike) -> Complex:
-        """Compute the response C (s - A)^-1 B + D (k, outputs, inputs): see `LinearModel.frequency_response`."""
-        return np.array([self._response(complex(s)) for s in places_in_s(frequencies)])
-
     def _response(self, s: complex) -> Complex:
-        with not_at_poles(s):
-            return self.C @ np.linalg.solve(s * np.eye(len(self.A)) - self.A, self.B) + self.D
+        return self.C @ np.linalg.solve(s * np.eye(len(self.A)) - self.A, self.B) + self.D
 
     @checked_arguments()
     def error(self, frequencies: ArrayLike, outputs: Sequence[str] | None = None) -> Array:

@@ -12,6 +12,7 @@ import scipy
 from paraflex.arguments import checked_arguments
 from paraflex.arrays import Array
 from paraflex.dynamics import State
+from paraflex.dynamics.state_space import StateSpace
 from paraflex.errors import InputError, as_enum
 from paraflex.kinematics import ModelWithPaths
 from paraflex.limits import solvable
@@ -21,8 +22,7 @@ from paraflex.linear.coordinates import Variable
 from paraflex.linear.linearise import linear_model, linearise, operating_point
 from paraflex.linear.model import LinearModel
 from paraflex.linear.reduced import ReducedModel, ReductionMethod
-from paraflex.linear.varying import describes
-from paraflex.linear.zeros import StateSpace
+from paraflex.linear.varying import describes, same_bodies
 from paraflex.mechanism import ActuationMode, Mechanism, Start
 from paraflex.motion import MotionRun
 from paraflex.tracking import TrackingRun, TrackingTask
@@ -151,13 +151,12 @@ def _linear_model(source: Source, given: Sequence[ReducedModel], options: dict[s
         return source
     if not given:
         return linearise(source, **options)
-    first, point = given[0].full, operating_point(source, **options)
-    same = len(point.coordinates.measured) > np.max(first.minimal.chosen.joints, initial=-1)
-    if not same or [body.all for body in point.coordinates.system.bodies] != [
-        body.all for body in first.minimal.system.bodies
-    ]:
-        raise _other_mechanism_error(given[0], point.coordinates.system.mechanism.name)
-    model = linear_model(*point, chosen=first.minimal.chosen)
+    first, (chart, point, unbalanced) = given[0].full, operating_point(source, **options)
+    system = chart.coordinates.system
+    same = len(chart.coordinates.measured) > np.max(first.minimal.chosen.joints, initial=-1)
+    if not same or not same_bodies(system, first.minimal.system):
+        raise _other_mechanism_error(given[0], system.mechanism.name)
+    model = linear_model(chart, point, unbalanced, chosen=first.minimal.chosen)
     _check_alike(given[0], model)
     if not describes(model.minimal, first.minimal):
         raise InputError(
@@ -169,7 +168,7 @@ def _linear_model(source: Source, given: Sequence[ReducedModel], options: dict[s
 
 def _check_alike(basis: ReducedModel, model: LinearModel) -> None:
     """Raise an `InputError` for a basis of another mechanism or in other coordinates."""
-    if [body.all for body in model.minimal.system.bodies] != [body.all for body in basis.full.minimal.system.bodies]:
+    if not same_bodies(model.minimal.system, basis.full.minimal.system):
         raise _other_mechanism_error(basis, model.mechanism)
     if basis.full.states != model.states:
         own = {one.name for one in model.states}
@@ -216,12 +215,9 @@ def _reduced(model: LinearModel, states: int, method: ReductionMethod, feed_thro
 
 def _balanced(model: LinearModel, states: int) -> ReducedModel:
     """Reduce the model by balanced truncation."""
-    full = model.scaled
-    found = balanced_truncation(full, states, model.low_frequency)
-    left, right = found.left, found.right
-    space = StateSpace(left @ full.A @ right, left @ full.B, full.C @ right, full.D)
-    names = tuple(Variable(f"balanced{k + 1}", "1") for k in range(len(left)))
-    return ReducedModel(model, ReductionMethod.BALANCED, names, space, hankel=found.hankel, bound=found.bound)
+    space, hankel, bound = balanced_truncation(model.scaled, states, model.low_frequency)
+    names = tuple(Variable(f"balanced{k + 1}", "1") for k in range(len(space.A)))
+    return ReducedModel(model, ReductionMethod.BALANCED, names, space, hankel=hankel, bound=bound)
 
 
 def _symmetric(stiffness: Array) -> Array:

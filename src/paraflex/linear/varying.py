@@ -10,7 +10,7 @@ including the terms of Z' that `minimal` has at every sample.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TYPE_CHECKING, NamedTuple, TypeVar
@@ -20,15 +20,16 @@ from scipy.interpolate import make_interp_spline
 
 from paraflex.arguments import checked_arguments
 from paraflex.arrays import Array
-from paraflex.dynamics import sensor_readings
+from paraflex.dynamics import System, sensor_readings
 from paraflex.dynamics.tangents import MotionPoint
 from paraflex.errors import InputError, Moment, SingularPositionError, as_enum
 from paraflex.limits import solvable
-from paraflex.linear.coordinates import CoordinateChoice, Coordinates, FirstCoordinates, Variable, named_axes
+from paraflex.linear.coordinates import CoordinateChoice, Coordinates, FirstCoordinates, Variable
 from paraflex.linear.discrete import InputHold, Prediction, SampledModel, transitions
-from paraflex.linear.linearise import Ports, charted, linear_model, moving, nearest_sample
+from paraflex.linear.linearise import Chart, Ports, charted, linear_model, moving, nearest_sample
 from paraflex.linear.minimal import MinimalEquations
 from paraflex.linear.model import LinearModel
+from paraflex.linear.named import labelled, matrices_of
 from paraflex.mechanism import ActuationMode
 from paraflex.motion import MotionRun
 from paraflex.tracking import TrackingRun, TrackingTask
@@ -117,7 +118,7 @@ class VaryingModel:
             The run is of a mechanism with other bodies.
         """
         found = moving(run, self.ports.mode)
-        if [body.all for body in found.system.bodies] != [body.all for body in self.coordinates.system.bodies]:
+        if not same_bodies(found.system, self.coordinates.system):
             raise InputError("belongs to a mechanism with other bodies", field="run", value=found.system.mechanism.name,
                              remedy="give a run of the mechanism of this model")  # fmt: skip
         return _along([found.point(k) for k in range(found.times.size)], self.coordinates, self.chosen, self.ports)
@@ -177,17 +178,10 @@ class VaryingModel:
 
     def to_xarray(self) -> xr.Dataset:
         """Return matrices and nominal values as a dataset labelled by time and names of variables, with units."""
-        import xarray as xr
-
-        data = {
-            "A": (("time", "state", "state_of"), self.A), "B": (("time", "state", "input"), self.B),
-            "C": (("time", "output", "state_of"), self.C), "D": (("time", "output", "input"), self.D),
-            **{f"nominal_{name}": (("time", name), getattr(self.nominal, f"{name}s"))
-               for name in ("state", "input", "output")},
-        }  # fmt: skip
+        nominal = {f"nominal_{name}": (("time", name), getattr(self.nominal, f"{name}s"))
+                   for name in ("state", "input", "output")}  # fmt: skip
         attrs = {"mechanism": self.mechanism, "mode": self.mode, "about": self.about}
-        axes = named_axes(self.states, self.inputs, self.outputs)
-        return xr.Dataset(data, coords={**axes, "time": self.times}, attrs=attrs)
+        return labelled(self, matrices_of(self, first=("time",)) | nominal, attrs, time=self.times)
 
 
 @checked_arguments()
@@ -227,25 +221,25 @@ def linearise_along(
     SingularPositionError
         A position is singular, so that no coordinates describe the motion.
     """
-    motion, ports, choice = charted(source, mode, forces, prescribed, coordinates)
+    motion, chart = charted(source, mode, forces, prescribed, coordinates)
     given = range(motion.times.size) if times is None else [nearest_sample(motion.times, at) for at in times]
     samples = np.unique(given).tolist()
     if len(samples) < _FEWEST:
         raise InputError("too few samples of the motion", field="times", value=len(samples),
                          remedy=f"give at least {_FEWEST} different ones")  # fmt: skip
     points = [motion.point(k) for k in samples]
-    chosen, found = in_one_chart(points, choice, ports, motion.about, lambda model: model.state_space)
-    first, (A, B, C, D) = linear_model(choice, points[0], ports, motion.about, chosen=chosen), zip(*found, strict=True)
+    chosen, found = in_one_chart(points, chart, lambda model: model.state_space)
+    first, (A, B, C, D) = linear_model(chart, points[0], chosen=chosen), zip(*found, strict=True)
     return VaryingModel(
         mechanism=first.mechanism, mode=first.mode, about=first.about, states=first.states, inputs=first.inputs,
         outputs=first.outputs, times=np.array([point.time for point in points]), A=np.array(A), B=np.array(B),
-        C=np.array(C), D=np.array(D), nominal=_along(points, choice, chosen, ports), coordinates=choice,
-        chosen=chosen, ports=ports, modal=first.modal_states,
+        C=np.array(C), D=np.array(D), nominal=_along(points, chart.coordinates, chosen, chart.ports),
+        coordinates=chart.coordinates, chosen=chosen, ports=chart.ports, modal=first.modal_states,
     )  # fmt: skip
 
 
 def in_one_chart(
-    points: Sequence[MotionPoint], coordinates: Coordinates, ports: Ports, about: str, take: Callable[[LinearModel], T]
+    points: Sequence[MotionPoint], chart: Chart, take: Callable[[LinearModel], T]
 ) -> tuple[CoordinateChoice, list[T]]:
     """Linearise at points of a motion in common minimal coordinates, and apply `take` to each linear model.
 
@@ -263,27 +257,28 @@ def in_one_chart(
     SingularPositionError
         No coordinates describe the motion at all points.
     """
-    without: list[int] = []
+    coordinates, without = chart.coordinates, list[int]()
     chosen, tries = coordinates.choose(coordinates.at(points[0])), len(coordinates.measured) + _MORE
     while True:
-        found = _taken((linear_model(coordinates, point, ports, about, chosen=chosen) for point in points), take)
-        if not isinstance(found, LinearModel):
+        first, found = None, []
+        for point in points:
+            model = linear_model(chart, point, chosen=chosen)
+            first = first or model
+            if not describes(model.minimal, first.minimal):
+                break
+            found.append(take(model))
+        else:
             return chosen, found
-        without += _given_up(found.minimal, coordinates)
+        # The model is beyond or near a singular position.
+        without += _given_up(model.minimal, coordinates)
         if not tries:
-            raise _singular(found.minimal, [one.name for one in coordinates.names(chosen)])
-        chosen, tries = coordinates.choose(found.minimal.tangents, without), tries - 1
+            raise _singular(model.minimal, [one.name for one in coordinates.names(chosen)])
+        chosen, tries = coordinates.choose(model.minimal.tangents, without), tries - 1
 
 
-def _taken(models: Iterable[LinearModel], take: Callable[[LinearModel], T]) -> list[T] | LinearModel:
-    """Apply `take` to all models; if one is beyond or near a singular position, return the first such model instead."""
-    first, found = None, []
-    for model in models:
-        first = first or model
-        if not describes(model.minimal, first.minimal):
-            return model
-        found.append(take(model))
-    return found
+def same_bodies(system: System, other: System) -> bool:
+    """Return whether two systems have the same coordinates of bodies."""
+    return [body.all for body in system.bodies] == [body.all for body in other.bodies]
 
 
 def describes(minimal: MinimalEquations, elsewhere: MinimalEquations) -> bool:

@@ -13,17 +13,16 @@ all inputs and outputs loses rank is a zero of the system.
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
-from paraflex.arrays import Array, Numbers
+from paraflex.arrays import Array, Complex, Numbers
+from paraflex.dynamics.state_space import StateSpace
 from paraflex.limits import solvable
 from paraflex.linear.independent import sizes, unit_rows
 
-Complex = NDArray[np.complex128]
 # Relative difference of zeros of two squared systems that are regarded as equal.
 _SAME = 1e-6
 # Singular values below this are zero, in a matrix with entries of size one: rounding errors are about 1e-14.
@@ -34,23 +33,6 @@ _ANYWHERE = (1.0, 2.718281828, 31.41592654)
 _INFINITE = 1e-12
 # Zeros at infinity of a general system are perturbed: zeros above this fraction of the fastest pole are omitted.
 _FURTHEST = 0.1
-
-
-class StateSpace(NamedTuple):
-    """Matrices of the state-space model x' = A x + B u, y = C x + D u."""
-
-    A: Array
-    B: Array
-    C: Array
-    D: Array
-
-    @classmethod
-    def of(cls, *given: Any) -> StateSpace:
-        """Return a model from array-like matrices; an empty A means a model without states."""
-        A, B, C, D = (np.atleast_2d(np.asarray(each, dtype=float)) for each in given)
-        if not A.size:
-            A, B, C = np.zeros((0, 0)), np.zeros((0, D.shape[1])), np.zeros((D.shape[0], 0))
-        return cls(A, B, C, D)
 
 
 class Vibrating(NamedTuple):

@@ -27,6 +27,13 @@ def all_known(given: Iterable[str], names: Collection[str], field: str, kind: st
         known(name, names, field, kind)
 
 
+def all_listed(given: Iterable[str], names: Collection[str], field: str, problem: str) -> None:
+    """Raise an `InputError` that lists all admissible names, unless all names are among them."""
+    for name in given:
+        if name not in names:
+            raise InputError(problem, field=field, value=name, remedy=f"choose from {', '.join(names)}")
+
+
 def finite(values: float | Iterable[float], field: str) -> None:
     """Raise an `InputError` unless a value, or each of several, is finite and of admissible size."""
     several = isinstance(values, Iterable) and getattr(values, "ndim", 1)

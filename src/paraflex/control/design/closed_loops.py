@@ -10,22 +10,20 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import scipy
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from paraflex.arguments import checked_arguments
-from paraflex.arrays import Array
+from paraflex.arrays import Array, Complex
 from paraflex.control.design.controllability import frequency_of
-from paraflex.control.design.sampled import SampledPlant, as_sampled, discretise, places
+from paraflex.control.design.sampled import SampledPlant, WithPoles, as_sampled, discretise, places
 from paraflex.control.laws.discrete import DiscreteModel, check_discrete, is_model, matrices_of
+from paraflex.dynamics.state_space import StateSpace
 from paraflex.errors import InputError, ResultWarning, warn_user, within
 from paraflex.linear.named import places_in_s
-from paraflex.linear.zeros import StateSpace
-from paraflex.mechanism.quantities import positive
 
 if TYPE_CHECKING:
     import pandas as pd
 
-Complex = NDArray[np.complex128]
 # Accuracy of poles on the unit circle.
 _ON_CIRCLE = 1e-9
 # Angles about those of the poles, in units of their distance from the circle; number of further angles; largest phase
@@ -36,7 +34,7 @@ _LATEST, _STEP = 200, 0.25
 
 
 @dataclass(frozen=True)
-class ClosedLoop:
+class ClosedLoop(WithPoles):
     """Sampled plant in feedback with a linear controller, u = controller(y).
 
     Attributes
@@ -73,11 +71,6 @@ class ClosedLoop:
         return found[np.argsort(-np.abs(found), kind="stable")]
 
     @property
-    def spectral_radius(self) -> float:
-        """Largest magnitude of the poles; the loop is stable if it is below one."""
-        return float(np.max(np.abs(self.poles), initial=0.0))
-
-    @property
     def stable(self) -> bool:
         """Whether all poles are inside the unit circle."""
         return self.spectral_radius < 1.0 - _ON_CIRCLE
@@ -88,8 +81,8 @@ class ClosedLoop:
         return damped_frequency(complex(self.poles[0]), self.plant.period)
 
     @cached_property
-    def _triangular(self) -> tuple[Complex, Complex, Complex]:
-        return _triangular(self.A, self.plant, self.controller)
+    def _at_motors(self) -> StateSpace:
+        return _at_motors(self.A, self.plant, self.controller)
 
     def sensitivity(self, omega: ArrayLike) -> Complex:
         """Return the sensitivity S (k, motors, motors) at the motors, the response to torques that are added there.
@@ -99,11 +92,9 @@ class ClosedLoop:
         omega : (k,) array
             Angular frequencies up to pi / period [rad/s].
         """
-        upper, added, follow = self._triangular
-        eye, one = np.eye(len(upper)), np.eye(added.shape[1])
         z = np.exp(places_in_s(omega, "omega") * self.plant.period)
-        found = [one + follow @ scipy.linalg.solve_triangular(at * eye - upper, added) for at in z]
-        return np.array(found).reshape(-1, *one.shape)
+        one = np.eye(len(self.plant.inputs))
+        return np.array([one + self._at_motors.at(at) for at in z]).reshape(-1, *one.shape)
 
     def loop(self, omega: ArrayLike) -> Complex:
         """Return the responses L_i (k, motors) of the loop opened at one motor, the others closed: 1 + L_i = 1 / S_ii.
@@ -216,8 +207,7 @@ def law_of(controller: Any) -> StateSpace:
     InputError
         A controller without matrices, or a continuous one.
     """
-    inner = getattr(controller, "law", None)
-    own = controller if inner is None or callable(inner) else inner
+    own = _inner(controller)
     own = getattr(own, "state_space", own)
     if not is_model(own) and not all(hasattr(own, name) for name in ("A", "B", "C", "D")):
         raise InputError("is not a linear law", field="controller", value=controller,
@@ -303,27 +293,23 @@ def closed_loops(models: Mapping[str, Any], controller: Any, **settings: Any) ->
 
     if not models:
         raise InputError("there is no model", field="models", remedy="name one")
-    loops = {}
+    rows = {}
     for name, model in models.items():
         with within(f"models.{name}"):
-            loops[name] = closed_loop(model, controller, **settings)
-    rows = {
-        name: {
-            "stable": one.stable, "spectral_radius": one.spectral_radius, "frequency": one.slowest[0],
-            "damping": one.slowest[1], "rate": float(np.log(max(one.spectral_radius, 1e-300))) / one.plant.period,
-        }
-        for name, one in loops.items()
-    }  # fmt: skip
-    for name, one in loops.items():
+            one = closed_loop(model, controller, **settings)
         warn_if_unstable(one, f"with {name}")
+        frequency, damping = one.slowest
+        rows[name] = {
+            "stable": one.stable, "spectral_radius": one.spectral_radius, "frequency": frequency, "damping": damping,
+            "rate": float(np.log(max(one.spectral_radius, 1e-300))) / one.plant.period,
+        }  # fmt: skip
     return pd.DataFrame.from_dict(rows, orient="index").sort_values("spectral_radius", kind="stable")
 
 
-def _triangular(A: Array, plant: SampledPlant, law: StateSpace) -> tuple[Complex, Complex, Complex]:
-    """Return the Schur form of A, and the input matrix at the motors and the output matrix of torques in its basis."""
-    upper, basis = scipy.linalg.schur(A.astype(complex), output="complex")
+def _at_motors(A: Array, plant: SampledPlant, law: StateSpace) -> StateSpace:
+    """Return the system from torques that are added at the motors to those of the controller, with a triangular A."""
     added = np.vstack([plant.B, np.zeros((len(law.A), plant.B.shape[1]))])
-    return upper, basis.conj().T @ added, np.hstack([law.D @ plant.C, law.C]) @ basis
+    return StateSpace(A, added, np.hstack([law.D @ plant.C, law.C]), np.zeros((added.shape[1],) * 2)).triangular()
 
 
 def poles_beyond(loop: ClosedLoop, later: int, radius: float) -> int:
@@ -344,14 +330,14 @@ def poles_beyond(loop: ClosedLoop, later: int, radius: float) -> int:
     """
     plant, law = loop.plant, loop.controller
     A = np.block([[plant.A, np.zeros((len(plant.A), len(law.A)))], [law.B @ plant.C, law.A]])
-    upper, added, follow = _triangular(A, plant, law)
+    opened = _at_motors(A, plant, law)
 
     def F(angles: Array) -> Complex:
         z = radius * np.exp(1j * angles)
-        G = [follow @ scipy.linalg.solve_triangular(at * np.eye(len(A)) - upper, added) for at in z]
-        return np.linalg.det(np.eye(len(follow)) - z[:, None, None] ** -later * np.array(G))
+        G = np.array([opened.at(at) for at in z])
+        return np.linalg.det(np.eye(len(opened.C)) - z[:, None, None] ** -later * G)
 
-    poles = np.diag(upper)
+    poles = np.diag(opened.A)
     near = np.abs(np.angle(poles))[:, None] + np.abs(radius - np.abs(poles))[:, None] * _ABOUT
     angles = np.unique(np.concatenate([np.linspace(0.0, np.pi, _GRID), near[(near > 0.0) & (near < np.pi)]]))
     values = F(angles)
@@ -397,17 +383,20 @@ def damped_frequency(z: complex, period: float) -> tuple[float, float]:
 
 def _sampled_for(model: Any, controller: Any, period: float | None, delay: float | None) -> SampledPlant:
     """Return the plant at the given period and delay, by default the controller's."""
-    inner = getattr(controller, "law", None)
-    sources = [controller, *([inner] if inner is not None and not callable(inner) else [])]
-    for source in sources:
+    for source in (controller, _inner(controller)):
         period = _own(source, ("period", "dt")) if period is None else period
         delay = _own(source, ("delay",)) if delay is None else delay
     if isinstance(model, SampledPlant):
         return model if period is None else as_sampled(model, period, model.delay)
     if period is None:
         raise InputError("is missing", field="period", remedy="give it in seconds")
-    positive(period, "period", "s")
     return discretise(model, period, 0.0 if delay is None else delay)
+
+
+def _inner(controller: Any) -> Any:
+    """Return the law of a `SampledController`, and another controller as it is."""
+    law = getattr(controller, "law", None)
+    return controller if law is None or callable(law) else law
 
 
 def _own(source: Any, attributes: Sequence[str]) -> float | None:

@@ -11,8 +11,8 @@ import scipy
 from paraflex.arrays import Array
 from paraflex.control.design.sampled import NamedMatrices, SampledPlant, as_sampled, discretise, named_matrices
 from paraflex.control.loop.filters import transfer_function
+from paraflex.dynamics.state_space import StateSpace
 from paraflex.errors import InputError
-from paraflex.linear.zeros import StateSpace
 from paraflex.mechanism.quantities import all_known, positive
 
 # Names of the noise inputs of the filters.
@@ -90,11 +90,7 @@ def _scaled(deviation: float, through: StateSpace, period: float) -> StateSpace:
 def _filtered(named: NamedMatrices, at: list[str], filters: list[StateSpace]) -> NamedMatrices:
     """Return the model with filters before some inputs: x' = A x + B (u + F w)."""
     A, B, C, D = named.matrices
-    own = scipy.linalg.block_diag(*(one.A for one in filters))
-    outputs, into = (
-        scipy.linalg.block_diag(*parts) for parts in zip(*((one.C, one.B) for one in filters), strict=True)
-    )
-    direct = scipy.linalg.block_diag(*(one.D for one in filters))
+    own, into, outputs, direct = (scipy.linalg.block_diag(*parts) for parts in zip(*filters, strict=True))
     places = [named.inputs.index(name) for name in at]
     B_d, D_d = B[:, places], D[:, places]
     states = [f"{name} disturbance {k + 1}" for name, one in zip(at, filters, strict=True) for k in range(len(one.A))]

@@ -42,11 +42,8 @@ def check_controllable(
     A = plant.A.copy()
     A[:n] /= size[:, None]
     A[:, :n] *= size
-    if transposed:
-        A, scale = A.T, np.concatenate([size, np.ones(len(A) - n)])
-    else:
-        scale = np.concatenate([1.0 / size, np.ones(len(A) - n)])
-    columns = columns * scale[:, None]
+    A = A.T if transposed else A
+    columns = columns * np.concatenate([size if transposed else 1.0 / size, np.ones(len(A) - n)])[:, None]
     columns = columns / max(float(np.linalg.norm(columns)), np.finfo(float).tiny)
     missed = []
     for z in plant.poles:

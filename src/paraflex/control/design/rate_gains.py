@@ -10,8 +10,8 @@ import numpy as np
 import scipy
 
 from paraflex.arguments import checked_arguments
-from paraflex.arrays import Array
-from paraflex.control.design.closed_loops import ClosedLoop, Complex, closed_loop, damped_frequency, named_law
+from paraflex.arrays import Array, Complex
+from paraflex.control.design.closed_loops import ClosedLoop, closed_loop, damped_frequency, named_law
 from paraflex.control.design.sampled import SampledPlant, as_sampled
 from paraflex.control.laws.discrete import side_by_side
 from paraflex.control.laws.kinds.rate_feedback import RateFeedback
@@ -339,20 +339,17 @@ def _collocated(model: Any, plant: SampledPlant) -> dict[str, str]:
     found = {}
     if isinstance(linear, LinearModel):
         mechanism = linear.minimal.system.mechanism
-        for motor in plant.inputs:
-            near = _nearest_gauge(mechanism, motor, plant.outputs)
-            found |= {} if near is None else {motor: near}
+        joints = {one.name: one.joint for one in mechanism.motors}
+        near = {name: _nearest_gauge(mechanism, joints[name], plant.outputs) for name in plant.inputs if name in joints}
+        found = {motor: gauge for motor, gauge in near.items() if gauge is not None}
     if not found:
         raise InputError("no motor has a strain gauge on a link at its joint", field="pairs",
                          remedy='name the sensor of each motor: pairs={"motor": "sensor"}')  # fmt: skip
     return found
 
 
-def _nearest_gauge(mechanism: Mechanism, motor: str, outputs: Sequence[str]) -> str | None:
-    motors = {one.name: one.joint for one in mechanism.motors}
-    if motor not in motors:
-        return None
-    joint, bodies = mechanism.joint(motors[motor]), {body.name: body for body in mechanism.bodies}
+def _nearest_gauge(mechanism: Mechanism, name: str, outputs: Sequence[str]) -> str | None:
+    joint, bodies = mechanism.joint(name), {body.name: body for body in mechanism.bodies}
     apart = {}
     for sensor in mechanism.sensors:
         location = sensor.location

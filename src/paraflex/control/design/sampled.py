@@ -9,15 +9,14 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
 from paraflex.arguments import checked_arguments
-from paraflex.arrays import Array
+from paraflex.arrays import Array, Complex
 from paraflex.control.loop.together import check_distinct, same_period, whole_and_part
+from paraflex.dynamics.state_space import StateSpace
 from paraflex.errors import InputError
 from paraflex.limits import PLANT_STATES, at_most
 from paraflex.linear.model import LinearModel
-from paraflex.linear.zeros import StateSpace
 from paraflex.mechanism.quantities import not_negative, positive
 
 
@@ -28,6 +27,15 @@ class NamedMatrices(NamedTuple):
     states: tuple[str, ...]
     inputs: tuple[str, ...]
     outputs: tuple[str, ...]
+
+
+class WithPoles:
+    """Base class of discrete systems with `poles` z."""
+
+    @property
+    def spectral_radius(self: Any) -> float:
+        """Largest magnitude of the poles; a loop is stable if it is below one."""
+        return float(np.max(np.abs(self.poles), initial=0.0))
 
 
 @dataclass(frozen=True)
@@ -84,7 +92,7 @@ class SampledPlant:
         return self.period
 
     @cached_property
-    def poles(self) -> NDArray[np.complex128]:
+    def poles(self) -> Complex:
         """Eigenvalues z (n,) of A; those of delayed torques are zero."""
         own = np.linalg.eigvals(self.A[: self.own, : self.own])
         return np.concatenate([own, np.zeros(len(self.states) - self.own)]).astype(complex)
@@ -154,8 +162,8 @@ def discretise(model: Any, period: float, delay: float = 0.0) -> SampledPlant:
     not_negative(delay, "delay", "s")
     whole, part = whole_and_part(delay / period)
     scaled, back = _scaled(model, named.matrices)
-    late, early = _held(scaled, period * part), _held(scaled, period * (1.0 - part))
-    over = _held(scaled, period)
+    times = period * part, period * (1.0 - part), period
+    late, early, over = (scipy.signal.cont2discrete(scaled, time)[:2] for time in times)
     old, new = (back @ each for each in (early[0] @ late[1], early[1]))
     n, m, p = len(named.states), len(named.inputs), len(named.outputs)
     feeds = bool(np.any(named.matrices.D))
@@ -262,12 +270,3 @@ def _scaled(model: Any, matrices: StateSpace) -> tuple[StateSpace, Array]:
         return matrices, np.zeros((0, 0))
     A, (sizes, _) = scipy.linalg.matrix_balance(matrices.A, permute=False, separate=True)
     return StateSpace(A, matrices.B / sizes[:, None], matrices.C * sizes, matrices.D), np.diag(sizes)
-
-
-def _held(matrices: StateSpace, time: float) -> tuple[Array, Array]:
-    """Return Phi (n, n) and Gamma (n, m) over a time [s] with inputs held."""
-    n, m = matrices.B.shape
-    both = np.zeros((n + m, n + m))
-    both[:n, :n], both[:n, n:] = matrices.A, matrices.B
-    whole = scipy.linalg.expm(both * time)
-    return whole[:n, :n], whole[:n, n:]

@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, fields
 from typing import TYPE_CHECKING, Any
-
-import numpy as np
 
 from paraflex.arguments import CheckedFields, named_in_errors
 from paraflex.control.laws.kinds import LAWS
 from paraflex.control.laws.law import Law, given, of_names
 from paraflex.control.loop.together import Numbers, check_distinct, check_name, check_whole, multiple_of
 from paraflex.errors import InputError, renamed, within
-from paraflex.mechanism import Mechanism, TimeProfile
+from paraflex.mechanism import Mechanism
 from paraflex.mechanism.loads import InTime
 from paraflex.mechanism.measured import encoders_of, measured_sensors
 from paraflex.mechanism.quantities import all_known
@@ -129,7 +127,7 @@ class ControllerDescription(CheckedFields):
         among = {"inputs": inputs, "motors": outputs}
         chosen = {each.name: of_names(getattr(self, each.name), among[each.metadata["by"]])
                   for each in fields(self) if each.metadata.get("by")}  # fmt: skip
-        return self._sampled(law, **chosen | {"reference": _functions(chosen["reference"])})
+        return self._sampled(law, **chosen)
 
     def _sampled(self, law: Law, **chosen: Any) -> SampledController:
         from paraflex.control.loop.chain import SampledController
@@ -168,14 +166,3 @@ def check_together(controllers: Iterable[ControllerDescription]) -> None:
         for one in several:
             multiple_of(one.name, one.period, min(each.period for each in several))
         check_whole([one.name for one in several if one.whole_torque])
-
-
-def _functions(reference: Any) -> Any:
-    """Return references with profiles in time replaced by functions of time."""
-    if not isinstance(reference, Mapping):
-        return reference
-    return {name: _value(each) if isinstance(each, TimeProfile) else each for name, each in reference.items()}
-
-
-def _value(profile: TimeProfile) -> Callable[[float], float]:
-    return lambda t: float(profile.evaluate(np.array([t]))[0][0])

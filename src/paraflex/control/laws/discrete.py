@@ -14,8 +14,8 @@ from paraflex.control.laws.controllers import Plant
 from paraflex.control.laws.law import Law
 from paraflex.control.laws.linear_law import LinearLaw
 from paraflex.control.loop.together import same_period
+from paraflex.dynamics.state_space import StateSpace
 from paraflex.errors import InputError
-from paraflex.linear.zeros import StateSpace
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,10 +48,9 @@ class DiscreteModel(Law, title="state space"):
         InputError
             Another number of inputs or outputs, or another period.
         """
-        if inputs:
-            _check_count(inputs, self.B.shape[1], "inputs")
-        if outputs:
-            _check_count(outputs, self.C.shape[0], "outputs")
+        for names, count, field in ((inputs, self.B.shape[1], "inputs"), (outputs, self.C.shape[0], "outputs")):
+            if names and len(names) != count:
+                raise InputError(f"the model has {count}", field=field, value=", ".join(names), remedy="name as many")
         if self.period is not None and not same_period(self.period, period):
             raise InputError(f"the model is sampled every {self.period:g} s", field="period", value=period,
                              remedy="leave it out")  # fmt: skip
@@ -60,11 +59,6 @@ class DiscreteModel(Law, title="state space"):
         """Return the law in a run: see `Law.start`."""
         self.check_size(plant.inputs, plant.outputs, plant.period)
         return LinearLaw(self.A, self.B, self.C, self.D)
-
-
-def _check_count(names: Sequence[str], count: int, field: str) -> None:
-    if len(names) != count:
-        raise InputError(f"the model has {count}", field=field, value=", ".join(names), remedy="name as many")
 
 
 def discrete_model(given: Any) -> DiscreteModel:

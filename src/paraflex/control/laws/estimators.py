@@ -8,10 +8,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
 from paraflex.arguments import checked_arguments
-from paraflex.arrays import Array
+from paraflex.arrays import Array, Complex
 from paraflex.control.laws.linear_law import LinearLaw
 from paraflex.errors import InputError
 from paraflex.mechanism.quantities import positive
@@ -69,7 +68,7 @@ class KalmanFilter:
     covariance: Array
 
     @cached_property
-    def poles(self) -> NDArray[np.complex128]:
+    def poles(self) -> Complex:
         """Poles z (n,) of the estimation error: eigenvalues of A (1 - L C)."""
         return np.asarray(np.linalg.eigvals(self.A - self.A @ self.gain @ self.C), dtype=complex)
 

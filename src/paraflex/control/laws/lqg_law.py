@@ -6,22 +6,19 @@ from dataclasses import dataclass, field
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
-from paraflex.arrays import Array
-from paraflex.control.design.sampled import SampledPlant
+from paraflex.arrays import Array, Complex
+from paraflex.control.design.sampled import SampledPlant, WithPoles
 from paraflex.control.laws.controllers import Plant
 from paraflex.control.laws.estimators import KalmanFilter
 from paraflex.control.laws.linear_law import LinearLaw, LinearState
 from paraflex.control.loop.together import SAME
+from paraflex.dynamics.state_space import StateSpace
 from paraflex.errors import InputError
-from paraflex.linear.zeros import StateSpace
-
-Complex = NDArray[np.complex128]
 
 
 @dataclass(frozen=True)
-class Regulator:
+class Regulator(WithPoles):
     """State feedback u = -`gain` [x; integrals] of a sampled plant.
 
     Attributes
@@ -44,14 +41,9 @@ class Regulator:
     integrated: tuple[str, ...]
     poles: Complex
 
-    @property
-    def spectral_radius(self) -> float:
-        """Largest magnitude of the poles."""
-        return float(np.max(np.abs(self.poles), initial=0.0))
-
 
 @dataclass(frozen=True)
-class LQGDesign:
+class LQGDesign(WithPoles):
     """Regulator that acts on the estimate of a Kalman filter.
 
     Attributes
@@ -90,11 +82,6 @@ class LQGDesign:
         return np.concatenate([self.regulator.poles, self.filter.poles])
 
     @property
-    def spectral_radius(self) -> float:
-        """Largest magnitude of the poles."""
-        return float(np.max(np.abs(self.poles), initial=0.0))
-
-    @property
     def period(self) -> float:
         """Sampling period [s]."""
         return self.regulator.plant.period
@@ -121,18 +108,13 @@ class LQGDesign:
         The states are the estimate before the reading, and the integrals.
         """
         one, L, n = self.filter, self.L, len(self.filter.A)
-        rows = self._integrals
+        rows = self.period * np.eye(len(self.measured))[[self.measured.index(one) for one in self.regulator.integrated]]
         K, K_i = np.split(self.K, [n], axis=1)
         rest = np.eye(n) - L @ one.C
         C, D = np.hstack([-K @ rest, -K_i]), -K @ L
         A = np.vstack([np.hstack([one.A @ rest, np.zeros((n, len(rows)))]) + one.B @ C,
                        np.eye(len(rows), n + len(rows), n)])  # fmt: skip
         return StateSpace(A, np.vstack([one.A @ L + one.B @ D, rows]), C, D)
-
-    @property
-    def _integrals(self) -> Array:
-        """Contribution of a reading to the integrals (integrated, measured)."""
-        return self.period * np.eye(len(self.measured))[[self.measured.index(one) for one in self.regulator.integrated]]
 
     def law(self) -> LQGLaw:
         """Return the control law in its initial state, for `SampledController`."""
@@ -219,11 +201,8 @@ class LQGLaw:
     @property
     def integrals(self) -> Array:
         """Integrals of outputs (integrated,)."""
-        return (
-            np.zeros(len(self.design.regulator.integrated))
-            if self._state is None
-            else self._state.x[len(self.design.start) :]
-        )
+        integrated = len(self.design.regulator.integrated)
+        return np.zeros(integrated) if self._state is None else self._state.x[len(self.design.start) :]
 
     def start(self, plant: Plant) -> LQGInRun | None:
         """Reset the state, and return the law in a run: see `LQGDesign.in_run`; None if a subclass may step itself."""

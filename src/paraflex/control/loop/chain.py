@@ -26,8 +26,8 @@ from paraflex.control.loop.amplifiers import largest_commands
 from paraflex.control.loop.filters import transfer_function
 from paraflex.control.loop.references import Reference, references
 from paraflex.control.loop.together import by_name, checked_number, is_number, real_numbers
+from paraflex.dynamics.state_space import StateSpace
 from paraflex.errors import InputError
-from paraflex.linear.zeros import StateSpace
 from paraflex.mechanism.quantities import not_negative
 from paraflex.motion import MotionRun
 from paraflex.tracking import TrackingRun
@@ -249,8 +249,6 @@ class SampledController:
                 errors[i] -= reference(t)
         torques, state = self.started.step(self.chain_state.law, k, t, errors)
         self.chain_state = self.chain_state._replace(law=state, filtered=filtered)
-        if torques is None:
-            return None  # As a float array it would be NaN.
         wanted = real_numbers(torques)
         if wanted is None:
             return torques  # The loop reports the error.

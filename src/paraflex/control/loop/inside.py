@@ -17,7 +17,7 @@ from paraflex.control.loop.readings import Readings
 from paraflex.control.loop.references import AtSamples
 from paraflex.control.loop.together import SAME, periods_in, whole_and_part
 from paraflex.kernel.arrays import apart
-from paraflex.kernel.sampled import NOT_FINITE, RAISED, SAMPLED, WRONG, SampledLaw
+from paraflex.kernel.sampled import SAMPLED, SampledLaw
 
 _MATRICES = ("A", "B", "C", "D", "E", "first", "holding", "waiting")
 
@@ -87,17 +87,8 @@ def linear_model(controller: Any, plant: Plant) -> DiscreteModel | None:
     return DiscreteModel(law.A, law.B, P @ law.C, P @ law.D, plant.period, plant.inputs, plant.outputs)
 
 
-def wrong_torques(law: SampledLaw) -> list[int]:
-    """Return the indices among the outputs of torques that are not finite, if these ended a run; else none."""
-    if law.counts[WRONG] != NOT_FINITE:
-        return []
-    return np.flatnonzero(~np.isfinite(law.wanted[law.counts[SAMPLED]])).tolist()
-
-
-def exception_of(law: SampledLaw, controller: Any) -> Exception | None:
-    """Return the exception of a compiled function that ended a run, by repeating the last sample; None without one."""
-    if law.counts[WRONG] != RAISED:
-        return None
+def exception_of(law: SampledLaw, controller: Any) -> Exception:
+    """Return the exception of a compiled function that ended a run, by repeating the last sample."""
     k, started = int(law.counts[SAMPLED]), controller.started
     try:
         started.step(law.scratch[1, : started.states], k, float(law.t[k]), law.readings[k] - law.reference[k])

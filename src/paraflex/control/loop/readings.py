@@ -96,7 +96,9 @@ class Readings:
         found = [_affine(system, sensor) for sensor in sensors] if found is None else found
         self._found = found
         self.linear: list[int] = [k for k, one in enumerate(found) if one is not None]
-        self.affine: Affine = _stacked([one for one in found if one is not None], system.n)
+        none, rows = np.zeros((0, system.n)), [one for one in found if one is not None]
+        together = zip(Affine(np.zeros(0), none, none, none, none, np.zeros(0, int)), *rows, strict=True)
+        self.affine: Affine = Affine(*map(np.concatenate, together))
         several = [_place(system, sensor, k) for k, sensor in enumerate(sensors)]
         self.places: list[Place] = [place for place in several if place is not None]
         apart = {*self.linear, *(place.sensor for place in self.places)}
@@ -166,10 +168,3 @@ def _affine(system: System, sensor: Sensor) -> Affine | None:
         if not abs(exact[0] - linear[0]) <= _SAME * max(abs(exact[0]), abs(linear[0])):
             return None
     return found
-
-
-def _stacked(parts: Sequence[Affine], n: int) -> Affine:
-    if not parts:
-        none = np.zeros((0, n))
-        return Affine(np.zeros(0), none, none, none, none, np.zeros(0, int))
-    return Affine(*map(np.concatenate, zip(*parts, strict=True)))

@@ -15,7 +15,7 @@ from paraflex.control.loop.together import OPEN_LOOP, PLAN
 from paraflex.dynamics.sensors import SensorReader
 from paraflex.errors import InputError
 from paraflex.kinematics import RigidMotion
-from paraflex.mechanism import Mechanism
+from paraflex.mechanism import Mechanism, TimeProfile
 from paraflex.mechanism.measured import measured_sensors
 from paraflex.mechanism.quantities import all_known
 from paraflex.motion import MotionRun
@@ -55,6 +55,9 @@ def references(given: Mapping[str, Any] | TrackingRun | MotionRun | str | None, 
 
 
 def _reference(given: Any, field: str) -> Reference:
+    if isinstance(given, TimeProfile):
+        profile: TimeProfile = given
+        return lambda t: float(profile.evaluate(np.array([t]))[0][0])
     if callable(given):
         function: Callable[[float], Any] = given
         return lambda t: float(function(t))

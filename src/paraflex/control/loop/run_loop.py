@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -13,7 +13,7 @@ from paraflex.arrays import Array
 from paraflex.control.laws.controllers import Controller, Plant
 from paraflex.control.laws.discrete import DiscreteModel
 from paraflex.control.loop.chain import CHANGING, ChainSample, SampledController, as_law
-from paraflex.control.loop.inside import exception_of, linear_model, wrong_torques
+from paraflex.control.loop.inside import exception_of, linear_model
 from paraflex.control.loop.together import (
     check_distinct,
     check_name,
@@ -24,7 +24,7 @@ from paraflex.control.loop.together import (
     whole_and_part,
 )
 from paraflex.errors import InputError
-from paraflex.kernel.sampled import ACTED, SAMPLED, SampledLaw
+from paraflex.kernel.sampled import ACTED, RAISED, SAMPLED, WRONG, SampledLaw
 from paraflex.mechanism.quantities import not_negative
 
 
@@ -133,19 +133,19 @@ class Loop:
         self.names: list[str] = _names(self.controllers)
         check_whole(self.whole)
         self._start = start
-        self._plants: list[Plant] = []
+        self.plants: list[Plant] = []
         for name, each in zip(self.names, self.controllers, strict=True):
             try:
-                self._plants.append(plant(each))
-                each.start(self._plants[-1])
+                self.plants.append(plant(each))
+                each.start(self.plants[-1])
             except InputError as error:
                 raise error.within(name) from None
             except Exception as error:
                 raise _raised(name, error) from error
         # Sensors that the controllers read, in the order of the readings for `act`.
-        self.read: tuple[str, ...] = tuple(dict.fromkeys(name for plant in self._plants for name in plant.inputs))
-        self._inputs = [[self.read.index(name) for name in plant.inputs] for plant in self._plants]
-        self._outputs = [[motors.index(name) for name in plant.outputs] for plant in self._plants]
+        self.read: tuple[str, ...] = tuple(dict.fromkeys(name for plant in self.plants for name in plant.inputs))
+        self._inputs = [[self.read.index(name) for name in plant.inputs] for plant in self.plants]
+        self._outputs = [[motors.index(name) for name in plant.outputs] for plant in self.plants]
         self.period: float = min(each.period for each in self.controllers)
         self._every = [
             multiple_of(name, each.period, self.period) for name, each in zip(self.names, self.controllers, strict=True)
@@ -163,20 +163,14 @@ class Loop:
         self.inside: SampledLaw | None = None
 
     @property
-    def alone(self) -> tuple[Controller, Plant] | None:
-        """Controller and its plant if there is only one; else None."""
-        return (self.controllers[0], self._plants[0]) if len(self.controllers) == 1 else None
-
-    @property
     def failure(self) -> LawFailure | None:
         """Failure that ended a run in the compiled time loop; None without one."""
-        if self.inside is None:
+        law = self.inside
+        if law is None or not law.counts[WRONG]:
             return None
-        raised = exception_of(self.inside, self.controllers[0])
-        if raised is not None:
-            return _raised(self.names[0], raised)
-        wrong = wrong_torques(self.inside)
-        return _not_finite(self.names[0], [self._plants[0].outputs[k] for k in wrong]) if wrong else None
+        if law.counts[WRONG] == RAISED:
+            return _raised(self.names[0], exception_of(law, self.controllers[0]))
+        return _not_finite(self.names[0], self.plants[0].outputs, law.wanted[law.counts[SAMPLED]])
 
     @property
     def whole(self) -> list[str]:
@@ -233,29 +227,36 @@ class Loop:
         return self.acting.sum(axis=0)
 
     def _step(self, k: int, number: int, t: float, y: Array) -> Array:
-        name, controller, outputs = self.names[k], self.controllers[k], self._plants[k].outputs
+        name, controller, outputs = self.names[k], self.controllers[k], self.plants[k].outputs
         try:
             returned = controller.step(number, t, y)
         except Exception as error:
             raise _raised(name, error) from error
-        torques = None if returned is None else real_numbers(returned)
+        torques = real_numbers(returned)
         if torques is None:
-            kind = "complex numbers" if returned is not None and np.iscomplexobj(returned) else type(returned).__name__
+            kind = "complex numbers" if np.iscomplexobj(returned) else type(returned).__name__
             raise LawFailure(f'controller "{name}" returned {kind}, not torques')
         torques = np.atleast_1d(torques)
         if torques.shape != (len(outputs),):
             count = "one" if torques.size == 1 else " x ".join(map(str, torques.shape))
             raise LawFailure(f'controller "{name}" returned {count} in place of {len(outputs)} torques')
-        wrong = [motor for motor, value in zip(outputs, torques, strict=True) if not np.isfinite(value)]
-        if wrong:
-            raise _not_finite(name, wrong)
+        if not np.all(np.isfinite(torques)):
+            raise _not_finite(name, outputs, torques)
         last = getattr(controller, "last", None)
         record = last if isinstance(last, ChainSample) else ChainSample(y, torques, torques)
         self.kept[k].append((t, record.readings, record.requested, torques))
         return torques
 
-    def keep_last(self) -> None:
-        """Give the controller in the compiled time loop its last sample, as it has outside of that loop."""
+    def note_inside(self, known: int, note: Callable[[float, Array], None]) -> None:
+        """Give the controller in the compiled time loop its last sample, and note the torques that acted there.
+
+        Parameters
+        ----------
+        known : int
+            Number of changes of torques that are known already.
+        note : callable
+            Function of a time [s] and of the torques (motors,) of all motors that act from then on.
+        """
         law, controller = self.inside, self.controllers[0]
         if law is None or not law.counts[SAMPLED]:
             return
@@ -263,22 +264,10 @@ class Loop:
         assert isinstance(controller, SampledController)
         last = ChainSample(law.readings[k].copy(), law.wanted[k].copy(), law.given[k].copy())
         controller.chain_state = controller.chain_state._replace(last=last)
-
-    def torques_acted(self, after: int) -> Iterator[tuple[float, Array]]:
-        """Yield times and torques (motors,) of all motors that began to act in the compiled time loop.
-
-        Parameters
-        ----------
-        after : int
-            Number of changes to skip, which are known already.
-        """
-        law = self.inside
-        if law is None:
-            return
-        for k in range(after, int(law.counts[ACTED])):
+        for k in range(known, int(law.counts[ACTED])):
             torques = np.zeros(law.held.size)
             torques[law.outputs] = law.given[k]
-            yield float(law.acted[k]), torques
+            note(float(law.acted[k]), torques)
 
     def records(self, units: Callable[[str], str]) -> tuple[ControllerRecord, ...]:
         """Return the record of each controller.
@@ -291,7 +280,7 @@ class Loop:
         return tuple(self._record(k, units) for k in range(len(self.controllers)))
 
     def _record(self, k: int, units: Callable[[str], str]) -> ControllerRecord:
-        controller, plant = self.controllers[k], self._plants[k]
+        controller, plant = self.controllers[k], self.plants[k]
         inside = self.inside
         if inside is None:
             t, readings, requested, applied = list(zip(*self.kept[k], strict=True)) or [()] * 4
@@ -322,13 +311,13 @@ class Loop:
         state = [_changing(each) for each in self.controllers]
         own = (self._next, self._due, self.acting, self.kept)
         # Plants, with tasks and mechanisms, are not copied.
-        memo = {id(value): value for plant in self._plants for value in (plant, *vars(plant).values())}
+        memo = {id(value): value for plant in self.plants for value in (plant, *vars(plant).values())}
         inside = None if self.inside is None else [array.copy() for array in self.inside]
         return copy.deepcopy((state, own), memo), inside
 
     def restore(self, saved: Any) -> None:
         """Return to a state that `saved` returned."""
-        memo = {id(value): value for plant in self._plants for value in (plant, *vars(plant).values())}
+        memo = {id(value): value for plant in self.plants for value in (plant, *vars(plant).values())}
         outside, inside = saved
         states, own = copy.deepcopy(outside, memo)
         self._next, self._due, self.acting, self.kept = own
@@ -352,8 +341,9 @@ def _raised(name: str, error: Exception) -> LawFailure:
     return LawFailure(f'controller "{name}" raised {type(error).__name__}: {message}')
 
 
-def _not_finite(name: str, motors: Sequence[str]) -> LawFailure:
-    return LawFailure(f'controller "{name}" returned torques that are not finite, for {", ".join(motors)}')
+def _not_finite(name: str, outputs: Sequence[str], torques: Array) -> LawFailure:
+    wrong = [motor for motor, value in zip(outputs, torques, strict=True) if not np.isfinite(value)]
+    return LawFailure(f'controller "{name}" returned torques that are not finite, for {", ".join(wrong)}')
 
 
 def _controller(given: Any, sensors: tuple[str, ...], motors: tuple[str, ...]) -> Controller:
@@ -390,14 +380,4 @@ def _names(controllers: Sequence[Controller]) -> list[str]:
     names = [getattr(each, "name", "controller") for each in controllers]
     for name in names:
         check_name(name)
-    if len(set(names)) == len(names):
-        return names
-    twice = [name for name in names if names.count(name) > 1]
-    numbers = dict.fromkeys(twice, 0)
-    found = []
-    for name in names:
-        if name in numbers:
-            numbers[name] += 1
-            name = f"{name}{numbers[name]}"
-        found.append(name)
-    return found
+    return [f"{name}{names[: k + 1].count(name)}" if names.count(name) > 1 else name for k, name in enumerate(names)]

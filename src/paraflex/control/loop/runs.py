@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from copy import copy
 from dataclasses import dataclass
 from functools import cached_property
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from paraflex.arguments import named_in_errors
-from paraflex.arrays import Array
+from paraflex.arrays import Array, Indices
 from paraflex.control.design.closed_loops import closed_loop, poles_beyond, unstable_poles
 from paraflex.control.laws.discrete import side_by_side
 from paraflex.control.loop.run_loop import ControllerRecord
@@ -53,6 +52,11 @@ class Controlled:
         assert self.acting is not None
         return self.acting
 
+    @cached_property
+    def findings(self: Any) -> tuple[Finding, ...]:
+        """Findings on controllers, on events in the run, and on results that are implausible for the mechanism."""
+        return (*unstable_loop(self), *super().findings)  # pyright: ignore[reportAttributeAccessIssue]
+
 
 @named_in_errors("a run under controllers", "the run that Simulation.run returns")
 @dataclass(frozen=True)
@@ -63,14 +67,6 @@ class ControlledTracking(Controlled, TrackingRun):
     def follows(self) -> bool:
         """Whether torques drive the mechanism along the path."""
         return True
-
-    @cached_property
-    def findings(self) -> tuple[Finding, ...]:
-        """Findings on controllers, on events in the run, and on results that are implausible for the mechanism."""
-        return (
-            *unstable_loop(self, self.controllers, self.task.start.time, f"mode {self.mode.name}"),
-            *super().findings,
-        )
 
 
 @named_in_errors("a run under controllers", "the run that Simulation.run returns")
@@ -84,11 +80,6 @@ class ControlledMotion(Controlled, MotionRun):
     def in_time(self) -> bool:
         """Whether torques change in time."""
         return True
-
-    @cached_property
-    def findings(self) -> tuple[Finding, ...]:
-        """Findings on controllers, on events in the run, and on implausible results."""
-        return (*unstable_loop(self, self.controllers, float(self.solution.t[0]), ""), *super().findings)
 
 
 class TorqueLog:
@@ -106,31 +97,26 @@ class TorqueLog:
 
     def __init__(self, lags: Array, start: float, before: Array) -> None:
         self._lags, self._start = lags, start
-        self._times: list[float] = []
-        # Commanded torques, and torques that acted at the time of each command.
-        self._commanded: list[Array] = [before]
-        self._begun: list[Array] = [before]
+        # Time of each command, torques that acted then, and torques commanded; the first is before the start.
+        self._commands: list[tuple[float, Array, Array]] = [(0.0, before, before)]
 
     def __len__(self) -> int:
         """Return the number of commands."""
-        return len(self._times)
+        return len(self._commands) - 1
 
     def note(self, t: float, torques: Array) -> None:
         """Add torques (motors,) that are commanded from a time on."""
-        acting = self.now(t)
-        self._times.append(t)
-        self._commanded.append(torques)
-        self._begun.append(acting)
+        self._commands.append((t, self.now(t), torques))
 
     @property
     def last(self) -> tuple[float, Array, Array]:
         """Time of the last command, torques that acted then, and torques commanded from then on (motors,)."""
-        return self._times[-1] if self._times else 0.0, self._begun[-1], self._commanded[-1]
+        return self._commands[-1]
 
     def copy(self) -> TorqueLog:
         """Return a copy that can be continued independently."""
-        other = TorqueLog(self._lags, self._start, self._commanded[0])
-        other._times, other._commanded, other._begun = self._times.copy(), self._commanded.copy(), self._begun.copy()
+        other = copy(self)
+        other._commands = self._commands.copy()
         return other
 
     def now(self, t: float) -> Array:
@@ -141,16 +127,16 @@ class TorqueLog:
     def at(self, times: Array, slack: float) -> Array:
         """Return the torques (k, motors) that act at times (k,), those before a change within a slack [s]."""
         number = self._number(times, slack)
-        since = np.array([0.0, *self._times])[number]
-        return self._relaxed(times - since, np.array(self._begun)[number], np.array(self._commanded)[number])
+        since, begun, commanded = (np.array(each)[number] for each in zip(*self._commands, strict=True))
+        return self._relaxed(times - since, begun, commanded)
 
     def given(self, times: Array, slack: float) -> Array:
         """Return the torques (k, motors) that are commanded at times (k,), those before a change within a slack [s]."""
-        return np.array(self._commanded)[self._number(times, slack)]
+        return np.array([torques for _, _, torques in self._commands])[self._number(times, slack)]
 
-    def _number(self, times: Array, slack: float) -> NDArray[np.int64]:
+    def _number(self, times: Array, slack: float) -> Indices:
         """Return the indices of the commands that hold at times (k,); the first one holds at the start."""
-        changes = np.array(self._times)
+        changes = np.array([t for t, _, _ in self._commands[1:]])
         number = np.searchsorted(changes, times - slack, side="left")
         if changes.size and changes[0] <= self._start + slack:
             number = np.where(times <= changes[0] + slack, 1, number)
@@ -165,25 +151,13 @@ class TorqueLog:
         return commanded + np.where(self._lags > 0.0, left, 0.0) * (begun - commanded)
 
 
-def unstable_loop(
-    run: TrackingRun | MotionRun, records: Sequence[ControllerRecord], start: float, place: str
-) -> tuple[Finding, ...]:
+def unstable_loop(run: ControlledTracking | ControlledMotion) -> tuple[Finding, ...]:
     """Return a finding if the run's linear controllers, of one period and delay, make the linearised loop unstable.
 
     Limits of torques and rates are disregarded. Without a linear model, at a singular configuration for example, the
     loop is not checked.
-
-    Parameters
-    ----------
-    run : TrackingRun or MotionRun
-        Run under the controllers.
-    records : sequence of ControllerRecord
-        Records of all controllers of the run.
-    start : float
-        Time at which the run starts, about which it is linearised [s].
-    place : str
-        Place to which the finding refers, such as "mode ++".
     """
+    records = run.controllers
     if not records:
         return ()
     laws = [one.linear for one in records]
@@ -196,7 +170,7 @@ def unstable_loop(
         return ()
     radius = _GROWS ** (1.0 / max(len(first.t), _SAMPLES))
     try:
-        model = linearise(run, at=start)
+        model = linearise(run)
         now = closed_loop(model, side_by_side(linear), period=first.period, delay=part * first.period)
         if len(now.A) + later * len(now.plant.inputs) > _STATES:
             growing = f"{count} with |z| > {radius:.8g}" if (count := poles_beyond(now, later, radius)) else ""
@@ -211,4 +185,5 @@ def unstable_loop(
     several = ", ".join(f'"{one.name}"' for one in records)
     text = f"controller {several}: the sampled loop is unstable about the start: {growing}"
     remedy = "lower the gains, sample faster, reduce the delay; add link damping, rotor inertia, or noise in designs"
+    place = f"mode {run.mode.name}" if isinstance(run, TrackingRun) else ""
     return (Finding("loop-unstable", place, text, remedy),)

@@ -442,9 +442,9 @@ class Simulation:
     def _inside(self, loop: Loop) -> SampledLaw | None:
         """Return the sampled law of a loop that runs in the compiled time loop; None if it must run outside."""
         # The compiled time loop does not model amplifiers.
-        if loop.alone is None or self._torques.limited.any() or np.any(self._torques.amplifiers.lags):
+        if len(loop.controllers) > 1 or self._torques.limited.any() or np.any(self._torques.amplifiers.lags):
             return None
-        controller, plant = loop.alone
+        controller, plant = loop.controllers[0], loop.plants[0]
         own = [motor.name for motor in self.mechanism.motors]
         outputs = [own.index(name) for name in plant.outputs]
         return sampled_law(controller, plant, self._watched, outputs, self._torques.base, self._torques.held, self.end)
@@ -484,11 +484,8 @@ class Simulation:
         try:
             self._integration.march(until, on_progress=on_progress)
         finally:
-            # Log the torques that acted in the compiled time loop.
             if self._loop is not None:
-                self._loop.keep_last()
-                for t, torques in self._loop.torques_acted(len(self._torques.log)):
-                    self._torques.note(t, torques)
+                self._loop.note_inside(len(self._torques.log), self._torques.note)
         failure = None if self._loop is None else self._loop.failure
         if failure is not None:
             raise failure

@@ -176,6 +176,6 @@ def periods_in(duration: float, period: float) -> int:
 def real_numbers(given: Any) -> Array | None:
     """Return torques of a law or user as an array of floats; None if they are not real numbers."""
     try:
-        return None if np.iscomplexobj(given) else np.asarray(given, dtype=float)
+        return None if given is None or np.iscomplexobj(given) else np.asarray(given, dtype=float)
     except (TypeError, ValueError, OverflowError):
         return None

@@ -23,7 +23,7 @@ from paraflex.errors import InputError
 from paraflex.kernel.closure import LOOPS_CLOSED
 from paraflex.kinematics import RigidMotion
 from paraflex.kinematics.closure import PathClosure
-from paraflex.mechanism.quantities import positive
+from paraflex.mechanism.quantities import all_listed, positive
 
 # The iteration for the position has converged at a change below this fraction of the mechanism's size; largest number
 # of iterations.
@@ -68,11 +68,8 @@ class ComputedTorque(Law, kind="computed-torque", title="computed torque"):
             raise InputError("there is no planned motion to follow", field="law", value=self.title,
                              remedy="give a path to plan along, or another law")  # fmt: skip
         plan = planned_motion(plant)
-        joints = [motor.joint for motor in plan.mechanism.motors]
-        for name in plant.inputs:
-            if name not in joints:
-                raise InputError("is not an encoder of a motor", field="inputs", value=name,
-                                 remedy=f"choose from {', '.join(dict.fromkeys(joints))}")  # fmt: skip
+        joints = dict.fromkeys(motor.joint for motor in plan.mechanism.motors)
+        all_listed(plant.inputs, joints, "inputs", "is not an encoder of a motor")
         omega = 2.0 * np.pi * self.frequency
         return RigidInverse(
             plan, plant, omega**2, 2.0 * self.damping_ratio * omega, BackwardDifference(plant.period, self.cutoff)

@@ -10,7 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 import scipy
@@ -19,6 +19,7 @@ from paraflex.actuation import required_effort
 from paraflex.arguments import checked_arguments
 from paraflex.arrays import Array
 from paraflex.control.laws.controllers import Plant
+from paraflex.control.laws.discrete import DiscreteModel
 from paraflex.control.laws.estimators import CUTOFF, BackwardDifference
 from paraflex.control.laws.law import Law, given
 from paraflex.control.laws.linear_law import LinearLaw
@@ -27,9 +28,6 @@ from paraflex.errors import InputError
 from paraflex.mechanism import Mechanism
 from paraflex.mechanism.measured import encoders_of
 from paraflex.mechanism.quantities import all_known
-
-if TYPE_CHECKING:
-    from paraflex.control.laws.discrete import DiscreteModel
 
 Gain = float | Sequence[float] | Mapping[str, float]
 
@@ -94,10 +92,9 @@ class JointPID(Law, kind="pid", title="PID of joints"):
 
         check_pairs(plant.inputs, plant.outputs)
         law = self._linear(plant.outputs, plant.period)
-        projector = None
-        if self.project and plant.task is not None:
-            projector = torque_projectors(required_effort(planned_motion(plant)), plant.outputs)
-        return replace(law, projector=projector)
+        if not self.project or plant.task is None:
+            return law
+        return replace(law, projector=torque_projectors(required_effort(planned_motion(plant)), plant.outputs))
 
     @checked_arguments()
     def sampled(self, period: float, mechanism: Mechanism, motors: Sequence[str] | None = None) -> DiscreteModel:
@@ -117,8 +114,6 @@ class JointPID(Law, kind="pid", title="PID of joints"):
         InputError
             Motors that do not each have a joint of their own.
         """
-        from paraflex.control.laws.discrete import DiscreteModel
-
         names = tuple(motor.name for motor in mechanism.motors) if motors is None else tuple(motors)
         joints = encoders_of(mechanism, names)
         if len(joints) != len(names):

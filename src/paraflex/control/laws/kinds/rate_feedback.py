@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from paraflex.arguments import checked_arguments
 from paraflex.control.laws.controllers import Plant
+from paraflex.control.laws.discrete import DiscreteModel
 from paraflex.control.laws.estimators import CUTOFF, BackwardDifference
 from paraflex.control.laws.law import Law, given
 from paraflex.control.laws.linear_law import LinearLaw
@@ -17,9 +17,6 @@ from paraflex.errors import InputError
 from paraflex.mechanism import Mechanism
 from paraflex.mechanism.measured import measured_sensors
 from paraflex.mechanism.quantities import all_known, finite
-
-if TYPE_CHECKING:
-    from paraflex.control.laws.discrete import DiscreteModel
 
 
 @dataclass(frozen=True)
@@ -86,8 +83,6 @@ class RateFeedback(Law, kind="rate-feedback", title="rate feedback"):
     @checked_arguments()
     def sampled(self, period: float) -> DiscreteModel:
         """Return the law at a period [s] as a state-space model, for `closed_loop` and `margins`."""
-        from paraflex.control.laws.discrete import DiscreteModel
-
         law = self._linear(self.inputs, self.outputs, period)
         return DiscreteModel(law.A, law.B, law.C, law.D, period, self.inputs, self.outputs)
 

@@ -4,19 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from paraflex.arrays import Array
 from paraflex.control.laws.controllers import Plant
+from paraflex.control.laws.discrete import DiscreteModel, matrices_of
 from paraflex.control.laws.law import Law, given
+from paraflex.control.laws.linear_law import LinearLaw
 from paraflex.errors import InputError
 from paraflex.mechanism import Mechanism
-
-if TYPE_CHECKING:
-    from paraflex.control.laws.discrete import DiscreteModel
-    from paraflex.control.laws.linear_law import LinearLaw
 
 Rows = Sequence[Sequence[float]]
 
@@ -68,8 +66,6 @@ class StateSpaceLaw(Law, kind="state-space", title="state space"):
         return self._model().start(plant)
 
     def _model(self) -> DiscreteModel:
-        from paraflex.control.laws.discrete import DiscreteModel, matrices_of
-
         return DiscreteModel(*matrices_of(self), None, (), ())
 
 
