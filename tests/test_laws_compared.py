@@ -12,7 +12,7 @@ from matplotlib.colors import to_hex
 import paraflex as pf
 from paraflex import plots
 from paraflex.campaign import Workers
-from paraflex.cli.commands.control import CompareLawsRequest
+from paraflex.cli.commands.runs import CompareLawsRequest
 from paraflex.cli.control_tables import print_laws
 from paraflex.cli.tables import plain_console
 from paraflex.control import ControllerDescription, simulate_controlled

@@ -8,8 +8,8 @@ from paraflex.campaign import Workers
 from paraflex.checks import check_planned
 from paraflex.cli.bars import counting
 from paraflex.cli.collected import collected
-from paraflex.cli.commands.control import CompareLawsRequest
 from paraflex.cli.commands.requests import flagged
+from paraflex.cli.commands.runs import CompareLawsRequest
 from paraflex.cli.control_tables import print_laws
 from paraflex.cli.ending import exit_code, print_location, print_results
 from paraflex.cli.replacing import hold_results

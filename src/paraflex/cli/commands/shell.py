@@ -11,7 +11,6 @@ from typing import Any, NamedTuple
 
 import typer
 
-from paraflex.cli.commands.control import CompareLawsRequest
 from paraflex.cli.commands.models import (
     DrawRequest,
     InfoRequest,
@@ -24,7 +23,7 @@ from paraflex.cli.commands.models import (
     StaticsRequest,
 )
 from paraflex.cli.commands.results import AnimateRequest, CompareRequest, ExportRequest, PlotRequest, ReportRequest
-from paraflex.cli.commands.runs import CompareMethodsRequest, RunRequest, VerifyRequest
+from paraflex.cli.commands.runs import CompareLawsRequest, CompareMethodsRequest, RunRequest, VerifyRequest
 from paraflex.cli.commands.studies import IndicesRequest, SearchRequest, SensitivityRequest, SweepRequest
 from paraflex.cli.signals import exit_code, is_taken, raised
 
