@@ -7,14 +7,13 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rich.console import Console
 from rich.progress import TaskProgressColumn, TimeRemainingColumn
 
 from paraflex.cli import COMPLETE, signals
 from paraflex.cli.bars import bars, stopped_at_end
 from paraflex.cli.commands.results import AnimateRequest
 from paraflex.cli.replacing import refuse_existing
-from paraflex.cli.tables import plain_console
+from paraflex.cli.tables import PlainConsole
 from paraflex.errors import InputError
 from paraflex.results import open_results
 
@@ -33,7 +32,7 @@ def animate_command(request: AnimateRequest) -> int:
     refuse_existing(output, request.force)
     from paraflex.plots.film import FilmOptions, animate
 
-    console = plain_console(stderr=True)
+    console = PlainConsole(stderr=True)
     try:
         size = None if request.size is None else _size(request.size)
         options = FilmOptions(size=size, **{name: getattr(request, name) for name in _OPTIONS})
@@ -48,15 +47,14 @@ def animate_command(request: AnimateRequest) -> int:
         console.print(f"{width} x {height} pixels in {output}")
     else:
         duration = float(film.time[-1] - film.time[0]) / film.speed
-        console.print(
+        console.print_lines(
             f"{len(film.time)} pictures, {duration:.3g} s at {film.speed:g} of the speed, {width} x {height} pixels in "
-            f"{output}",
-            soft_wrap=True,
+            f"{output}"
         )
     return COMPLETE
 
 
-def _drawn(console: Console, draw: Callable[[Callable[[int, int], None]], Film]) -> Film:
+def _drawn(console: PlainConsole, draw: Callable[[Callable[[int, int], None]], Film]) -> Film:
     """Draw the film with a progress bar."""
     progress = bars(console, TaskProgressColumn(), TimeRemainingColumn())
     bar = progress.add_task("pictures", total=None)

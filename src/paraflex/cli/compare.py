@@ -5,14 +5,12 @@ from __future__ import annotations
 import time
 from pathlib import Path
 
-from rich.console import Console
-
 from paraflex.cli import COMPLETE
 from paraflex.cli.commands.requests import flagged
 from paraflex.cli.commands.results import CompareRequest
 from paraflex.cli.ending import print_location, print_results
 from paraflex.cli.replacing import hold_results
-from paraflex.cli.tables import print_table
+from paraflex.cli.tables import PlainConsole, print_table
 from paraflex.figures.comparison import motion_table, number_table, setting_table
 from paraflex.folders import RUN_COMPARISON
 from paraflex.results.comparison import RunComparison, compare
@@ -39,11 +37,10 @@ def compare_command(request: CompareRequest) -> int:
     return COMPLETE
 
 
-def print_compared(console: Console, found: RunComparison) -> None:
+def print_compared(console: PlainConsole, found: RunComparison) -> None:
     """Print the differences: settings, then the numbers and motions of each mode."""
-    console.print(f"first: {found.names[0]}\nsecond: {found.names[1]}", soft_wrap=True)
-    for note in found.notes:
-        console.print(note, soft_wrap=True)
+    console.print_lines(f"first: {found.names[0]}\nsecond: {found.names[1]}")
+    console.print_lines(*found.notes)
     if found.settings:
         print_table(console, setting_table(found))
     else:
@@ -57,5 +54,5 @@ def print_compared(console: Console, found: RunComparison) -> None:
             title = f"Numbers that differ{whose}" + (f" ({alike} others are the same)" if alike else "")
             print_table(console, number_table(differing, title))
         else:
-            console.print(f"All {alike} numbers are the same{whose}", soft_wrap=True)
+            console.print_lines(f"All {alike} numbers are the same{whose}")
         print_table(console, motion_table(found, mode, f"Motions{whose}: largest difference"))

@@ -11,7 +11,6 @@ from io import StringIO
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rich.console import Console
 from rich.table import Table
 
 from paraflex.checks.drawing import pose_of
@@ -19,7 +18,7 @@ from paraflex.cli import COMPLETE
 from paraflex.cli.commands.models import DrawRequest
 from paraflex.cli.replacing import refuse_existing
 from paraflex.cli.request import requested_model
-from paraflex.cli.tables import few, framed_table, plain_console
+from paraflex.cli.tables import PlainConsole, few, framed_table
 from paraflex.equilibria.conditions import StaticsDefaults
 from paraflex.errors import InputError
 from paraflex.files import Model
@@ -63,10 +62,10 @@ def draw_command(request: DrawRequest) -> int:
     from paraflex.plots.model_drawing import model_drawing
 
     _write(model_drawing(shown, theme_name=request.theme), shown, output)
-    _print_result(plain_console(), model, shown, request, output)
+    _print_result(PlainConsole(), model, shown, request, output)
     opens = (request.output is None and _has_screen()) if request.open is None else request.open
     if opens and not webbrowser.open(output.resolve().as_uri()):
-        plain_console(stderr=True).print("no browser opens it here", soft_wrap=True)
+        PlainConsole(stderr=True).print_lines("no browser opens it here")
     return COMPLETE
 
 
@@ -93,26 +92,25 @@ def _has_screen() -> bool:
     return screen and sys.stdout.isatty()
 
 
-def _print_result(console: Console, model: Model, shown: Posed, request: DrawRequest, output: Path) -> None:
+def _print_result(console: PlainConsole, model: Model, shown: Posed, request: DrawRequest, output: Path) -> None:
     """Print joints, bodies, drives, loads, sensors, open joints, the name of the drawing and the next commands."""
     mechanism = model.mechanism
-    console.print(f"{mechanism.name} ({model.source})", soft_wrap=True)
+    console.print_lines(f"{mechanism.name} ({model.source})")
     console.print(_joints(mechanism, shown))
-    console.print(f"bodies: {few([body.name for body in mechanism.bodies], _LISTED)}", soft_wrap=True)
-    for line in [*_drives(mechanism, shown), *_loads(mechanism, shown)]:
-        console.print(line, soft_wrap=True)
+    console.print_lines(f"bodies: {few([body.name for body in mechanism.bodies], _LISTED)}")
+    console.print_lines(*_drives(mechanism, shown), *_loads(mechanism, shown))
     if mechanism.sensors:
         sensors = [f"{one.name} ({one.kind})" for one in mechanism.sensors]
-        console.print(f"sensors: {few(sensors, _LISTED)}", soft_wrap=True)
+        console.print_lines(f"sensors: {few(sensors, _LISTED)}")
     for problem in shown.problems:
-        console.print(f"warning: {problem}", soft_wrap=True)
+        console.print_lines(f"warning: {problem}")
     if shown.gaps:
         listed = ", ".join(f"{name} by {gap}" for name, gap in shown.gaps.items())
-        console.print(f"drawn as given, with open joints: {listed}", soft_wrap=True)
-    console.print(f"drawn in {output}", soft_wrap=True)
+        console.print_lines(f"drawn as given, with open joints: {listed}")
+    console.print_lines(f"drawn in {output}")
     name = request.model.name
     then = "run" if model.statics == StaticsDefaults() else "statics"
-    console.print(f"next: paraflex info {name}, paraflex {then} {name}", soft_wrap=True)
+    console.print_lines(f"next: paraflex info {name}, paraflex {then} {name}")
 
 
 def _drives(mechanism: Mechanism, shown: Posed) -> list[str]:

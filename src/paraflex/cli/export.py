@@ -6,7 +6,7 @@ from pathlib import Path
 
 from paraflex.cli.commands.requests import flagged
 from paraflex.cli.commands.results import ExportRequest
-from paraflex.cli.tables import plain_console
+from paraflex.cli.tables import PlainConsole
 from paraflex.results import open_results
 from paraflex.results.export import export, export_table
 
@@ -25,7 +25,7 @@ def export_command(request: ExportRequest) -> int:
         else:
             data = open_results(results)
             files = export(data, output, request.to, shapes=request.shapes, force=request.force)
-    console = plain_console(stderr=True)
+    console = PlainConsole(stderr=True)
     for file in files:
-        console.print(f"{file} ({file.stat().st_size / 1e6:.3g} MB)", soft_wrap=True)
+        console.print_lines(f"{file} ({file.stat().st_size / 1e6:.3g} MB)")
     return 0

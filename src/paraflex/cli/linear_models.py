@@ -22,7 +22,7 @@ from paraflex.cli.request import (
     plan_study,
     requested_model,
 )
-from paraflex.cli.tables import plain_console
+from paraflex.cli.tables import PlainConsole
 from paraflex.compilation import compile_kernels_for
 from paraflex.dynamics import State, build_system, pose_at_rest, standing_system, undeformed
 from paraflex.errors import ActuationError, AssemblyError, InputError
@@ -255,7 +255,7 @@ def _motion(model: Model, request: LinearRequest) -> TrackingTask | MotionRun:
             value=request.at,
             remedy=f"choose one up to {number(study.duration, 6)} s",
         )
-    compile_kernels_for(model.mechanism, plain_console(stderr=True).print)
+    compile_kernels_for(model.mechanism, PlainConsole(stderr=True).print)
     until = study.duration if request.along is not None or not request.at else request.at
     with locating_errors(model):
         return simulate_motion(

@@ -7,7 +7,7 @@ from dataclasses import asdict
 from typing import Any
 
 from paraflex.cli.commands.models import MethodsRequest
-from paraflex.cli.tables import plain_console, plain_table
+from paraflex.cli.tables import PlainConsole, plain_table
 from paraflex.integrators import DEFAULT_METHOD, METHODS, Method
 
 
@@ -16,7 +16,7 @@ def methods_command(request: MethodsRequest) -> None:
     if request.json:
         print(json.dumps([_figures(method) for method in METHODS.values()], indent=2))
         return
-    out = plain_console()
+    out = PlainConsole()
     heads = ("name", "title", "form", "order", "steps", "constraints")
     rows = map(_row, METHODS.values())
     out.print(plain_table(*heads, rows=rows, title="methods of integration", wrapped=("title", "form")))

@@ -8,7 +8,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import asdict, replace
 from typing import Any
 
-from rich.console import Console
 from rich.progress import TimeElapsedColumn
 
 from paraflex.checks import check
@@ -16,28 +15,30 @@ from paraflex.cli.bars import bars, stopped_at_end
 from paraflex.cli.collected import collected
 from paraflex.cli.commands.options import PlanChoice
 from paraflex.cli.commands.runs import RunRequest
-from paraflex.cli.ending import exit_code, print_results
-from paraflex.cli.integration import model_parameters
-from paraflex.cli.reduced_bodies import kept_coordinates, reduced_as_requested
+from paraflex.cli.ending import exit_code, print_location, print_results, write_drawn, write_numbers
+from paraflex.cli.integration import kept_coordinates, model_parameters, reduced_as_requested
 from paraflex.cli.replacing import hold_results
 from paraflex.cli.request import acting_controllers, command_provenance, controller_arguments, locating_errors
-from paraflex.cli.tables import controllers, loads, plain_console, reduction, validity
-from paraflex.cli.writing import write_drawn_run, write_numbers
+from paraflex.cli.run_lines import load_lines
+from paraflex.cli.tables import PlainConsole, print_table
 from paraflex.compilation import compile_kernels_for
 from paraflex.control import ControllerDescription, simulate_controlled_motion
 from paraflex.dynamics import State, build_system, standing_system
 from paraflex.dynamics.state import nearest_state
 from paraflex.errors import ControllerError, InputError, IntegrationError, ResultWarning, ValidityWarning, renamed
+from paraflex.figures.controllers import controller_table
+from paraflex.figures.reduction import reduced_words
 from paraflex.files import Model, StudyDefaults
 from paraflex.findings import DONE_STATUSES
 from paraflex.folders import RUN, ResultsFolder
-from paraflex.formatting import number
+from paraflex.formatting import number, quantity
 from paraflex.integrators import IntegrationOptions
 from paraflex.mechanism import Mechanism
 from paraflex.motion import MotionRun, simulate_motion, state_at
 from paraflex.reduced_bodies import size_of
 from paraflex.results import motion_dataset, motion_summary
 from paraflex.results.reduced_runs import compared_with_full
+from paraflex.results.validity import validity_line
 
 # Largest number of singular positions listed.
 _MOST_TIMES = 4
@@ -81,7 +82,7 @@ def _run_held(
     how: dict[str, Any],
     folder: ResultsFolder,
 ) -> int:
-    console, study = plain_console(stderr=True), model.study
+    console, study = PlainConsole(stderr=True), model.study
     compile_kernels_for(mechanism, console.print)
     began = time.perf_counter()
     controllers = acting_controllers(model, request)
@@ -110,14 +111,14 @@ def _run_held(
     print_results(summary, lambda out: _report(out, summary), as_json=request.json)
     finished = run.solution.status in DONE_STATUSES
     try:
-        place = write_drawn_run(data, folder, request, began)
+        write_drawn(data, folder, request.drawn)
     finally:
         if not finished:
             message = run.solution.message
             kept = run.solution.status == "interrupted"
-            console.print(f"{message}; results until then are kept" if kept else f"error: {message}", soft_wrap=True)
+            console.print_lines(f"{message}; results until then are kept" if kept else f"error: {message}")
     if not request.json:
-        console.print(place, soft_wrap=True)
+        print_location(began, "results", folder.path, request.drawn)
     return exit_code(finished, interrupted=run.solution.status == "interrupted")
 
 
@@ -139,7 +140,7 @@ def free_run(
 
 
 def _simulate(
-    console: Console,
+    console: PlainConsole,
     model: Model,
     mechanism: Mechanism,
     options: IntegrationOptions,
@@ -199,14 +200,18 @@ def _ended(summary: dict) -> str:
     )
 
 
-def _report(out: Console, summary: dict) -> None:
+def _report(out: PlainConsole, summary: dict) -> None:
     final = summary["final"]
     out.print(f"{summary['mechanism']}: {_ended(summary)}")
     if summary["event"]:
-        out.print(summary["message"], soft_wrap=True)
-    reduction(out, summary)
-    loads(out, {"": summary["loads"]})
-    controllers(out, [((), summary)])
+        out.print_lines(summary["message"])
+    if (reduced := summary.get("reduction")) is not None:
+        out.print_lines(
+            f"{reduced_words(reduced)}: points are up to {quantity(reduced['distance'], 'm', digits=2)} from their "
+            f"positions in the full run, in {number(summary['wall_time'] / reduced['full_wall_time'], 2)} of its time"
+        )
+    out.print_lines(*load_lines({"": summary["loads"]}))
+    print_table(out, controller_table({(): summary}))
     out.print("at the end:")
     # Points at which finite segments are connected by the program are left out.
     places = {point: at for point, at in final["point_position"].items() if None not in at and "._" not in point}
@@ -227,4 +232,4 @@ def _report(out: Console, summary: dict) -> None:
         f"largest violation of constraints {number(summary['constraint_position_max'], 2)} m, "
         f"imbalance of energy {number(summary['energy_balance_max'], 2)} J"
     )
-    validity(out, {"": summary["validity"]})
+    out.print_lines(validity_line({"": summary["validity"]}))

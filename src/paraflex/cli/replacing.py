@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from paraflex.cli.tables import few, plain_console
+from paraflex.cli.tables import PlainConsole, few
 from paraflex.errors import InputError
 from paraflex.folders import (
     COMPARISON,
@@ -73,8 +73,7 @@ def print_replaced(folder: Path) -> None:
         )
     if foreign:
         lines.append(f"{folder} holds files not written by paraflex, which stay: {few(foreign, _NAMED)}")
-    for line in lines:
-        plain_console(stderr=True).print(line, soft_wrap=True)
+    PlainConsole(stderr=True).print_lines(*lines)
 
 
 def _described(folder: Path, kind: str) -> str:

@@ -5,12 +5,10 @@ from __future__ import annotations
 import time
 from dataclasses import asdict
 
-from rich.console import Console
-
 from paraflex.cli.bars import counting
 from paraflex.cli.commands.requests import flagged
 from paraflex.cli.commands.runs import VerifyRequest
-from paraflex.cli.ending import exit_code, print_location, print_results
+from paraflex.cli.ending import exit_code, print_location, print_results, write_drawn
 from paraflex.cli.replacing import hold_results
 from paraflex.cli.request import (
     command_provenance,
@@ -21,8 +19,7 @@ from paraflex.cli.request import (
     requested_model,
     with_frames,
 )
-from paraflex.cli.tables import plain_console, print_table
-from paraflex.cli.writing import write_drawn
+from paraflex.cli.tables import PlainConsole, print_table
 from paraflex.compilation import compile_kernels
 from paraflex.engines import ENGINES
 from paraflex.errors import InputError, suggestion
@@ -57,7 +54,7 @@ def _verify(
     folder: ResultsFolder,
 ) -> int:
     """Run all models along a path, given with its name; write results into the held folder and return the exit code."""
-    console, (path, path_name) = plain_console(stderr=True), along
+    console, (path, path_name) = PlainConsole(stderr=True), along
     options, mechanism = _options(request), with_frames(model.mechanism, request.frames)
     for geometry in Geometry:
         if geometry is Geometry.LINEAR or "second-order" in models:
@@ -74,10 +71,10 @@ def _verify(
     if data is not None:
         verification.save_in(folder)
 
-    def show(out: Console) -> None:
+    def show(out: PlainConsole) -> None:
         span, extent = SPAN_WORDS[ErrorSpan(summary["error"])], path_extent(data)
-        out.print(f"{summary['mechanism']}: RMS tracking error {span}, and distances from the path of "
-                  f"{printed(summary['reference'])}", soft_wrap=True)  # fmt: skip
+        out.print_lines(f"{summary['mechanism']}: RMS tracking error {span}, and distances from the path of "
+                  f"{printed(summary['reference'])}")  # fmt: skip
         for mode in summary["modes"]:
             for table in (model_table(summary, mode, extent), distance_table(summary, mode, extent),
                           *link_tables(summary, mode)):  # fmt: skip
@@ -93,7 +90,7 @@ def _verify(
         for mode, by_model in verification.runs.items():
             for name, runs in by_model.items():
                 if runs.failure:
-                    console.print(f'error: mode "{mode}", {name}: {runs.failure}', soft_wrap=True)
+                    console.print_lines(f'error: mode "{mode}", {name}: {runs.failure}')
     return exit_code(verification.complete, interrupted=verification.interrupted)
 
 

@@ -95,15 +95,15 @@ COMMANDS = (
         Run a mechanism thousands of times with varied parameters; the same command continues an interrupted study.
 
         Writes report.html, results.parquet and summary.json, and trajectories/ if the study requests it."""),
-    ListedCommand("optimise", SearchRequest, "optimise.optimise_command", """
+    ListedCommand("optimise", SearchRequest, "search.optimise_command", """
         Search for the design with the smallest metrics; the same command continues an interrupted study.
 
         Writes result.json, best.toml, results.parquet and figures/."""),
-    ListedCommand("identify", SearchRequest, "identify.identify_command", """
+    ListedCommand("identify", SearchRequest, "search.identify_command", """
         Search for the parameters that reproduce given metrics; the same command continues an interrupted study.
 
         Writes result.json, best.toml, results.parquet and figures/."""),
-    ListedCommand("indices", IndicesRequest, "indices.indices_command", """
+    ListedCommand("indices", IndicesRequest, "sweep.indices_command", """
         Show which parameters metrics depend on: first-order and total Sobol indices over their ranges.
 
         Writes indices.json, indices.parquet, results.parquet and figures/."""),
@@ -119,11 +119,11 @@ COMMANDS = (
         Write results for other programs: tables as CSV or Parquet, a struct for MATLAB, netCDF."""),
     ListedCommand("modes", ModesRequest, "modes.modes_command", """
         List the actuation modes and how well each can drive the path."""),
-    ListedCommand("linearise", LineariseRequest, "linearise.linearise_command", """
+    ListedCommand("linearise", LineariseRequest, "linear.linearise_command", """
         Linear models at a pose or along a motion: frequencies and damping, poles, zeros, motors held and free.
 
         With --out it writes linear.nc, linear.json, figures/, and report.html with the mode shapes in motion."""),
-    ListedCommand("reduce", ReduceRequest, "reduce.reduce_command", """
+    ListedCommand("reduce", ReduceRequest, "linear.reduce_command", """
         Linear models of few states: how many are needed, frequencies, errors and responses beside the full model.
 
         With --out it writes reduced.nc, reduced.json and figures/."""),
