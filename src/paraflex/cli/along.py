@@ -75,7 +75,17 @@ def run_along(
         task, full = requested_tasks(request, model, mechanism, (path, name), modes)
         if request.segments is not None:
             check_stops(task.mechanism, options, request.stop_at)
-        parameters = _parameters(model, name, modes, task, how, request, controllers)
+        run = {
+            "path": name,
+            "modes": [mode.name for mode in modes],
+            "duration": float(task.motion.t[-1]),
+            "samples": int(task.motion.t.size),
+            "after": task.after.value,
+            "error": model.study.error,
+            "controllers": controller_arguments(model, controllers),
+        }
+        kept = kept_coordinates(request, model.study)
+        parameters = command_provenance(model, run | model_parameters(request, task.mechanism, kept) | how)
         findings = check_planned(model, task, name, modes, request.plan.assembly)
         method, error = own_method(request, options, controllers), model.study.error
         study = TrackingStudy(
@@ -182,28 +192,6 @@ def _model_name(request: RunRequest, mechanism: Mechanism) -> str:
     if request.ked:
         return "kineto-elastodynamics"
     return f"{mechanism.geometry.value} geometry" if request.segments is None else "finite segments"
-
-
-def _parameters(
-    model: Model,
-    path: str,
-    modes: list[ActuationMode],
-    task: TrackingTask,
-    how: dict,
-    request: RunRequest,
-    controllers: Sequence[ControllerDescription],
-) -> dict:
-    run = {
-        "path": path,
-        "modes": [mode.name for mode in modes],
-        "duration": float(task.motion.t[-1]),
-        "samples": int(task.motion.t.size),
-        "after": task.after.value,
-        "error": model.study.error,
-        "controllers": controller_arguments(model, controllers),
-    }
-    kept = kept_coordinates(request, model.study)
-    return command_provenance(model, run | model_parameters(request, task.mechanism, kept) | how)
 
 
 @contextmanager

@@ -3,22 +3,17 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 from rich.progress import TaskProgressColumn, TimeRemainingColumn
 
 from paraflex.cli import COMPLETE, signals
-from paraflex.cli.bars import bars, stopped_at_end
+from paraflex.cli.bars import late_bar
 from paraflex.cli.commands.results import AnimateRequest
 from paraflex.cli.replacing import refuse_existing
 from paraflex.cli.tables import PlainConsole
 from paraflex.errors import InputError
 from paraflex.results import open_results
-
-if TYPE_CHECKING:
-    from paraflex.plots.film import Film
 
 # Fields of `FilmOptions` that are passed on unchanged.
 _OPTIONS = ("magnify", "fps", "speed", "theme", "at", "model", "point")
@@ -36,7 +31,11 @@ def animate_command(request: AnimateRequest) -> int:
     try:
         size = None if request.size is None else _size(request.size)
         options = FilmOptions(size=size, **{name: getattr(request, name) for name in _OPTIONS})
-        film = _drawn(console, lambda report: animate(data, output, request.modes, options, on_progress=report))
+        with late_bar(console, "pictures", None, TaskProgressColumn(), TimeRemainingColumn()) as update:
+            film = animate(
+                data, output, request.modes, options,
+                on_progress=lambda done, total: update(completed=done, total=total),
+            )  # fmt: skip
     except KeyboardInterrupt:
         console.print("interrupted: nothing was written")
         return signals.exit_code()
@@ -52,19 +51,6 @@ def animate_command(request: AnimateRequest) -> int:
             f"{output}"
         )
     return COMPLETE
-
-
-def _drawn(console: PlainConsole, draw: Callable[[Callable[[int, int], None]], Film]) -> Film:
-    """Draw the film with a progress bar."""
-    progress = bars(console, TaskProgressColumn(), TimeRemainingColumn())
-    bar = progress.add_task("pictures", total=None)
-
-    def report(done: int, total: int) -> None:
-        progress.start()
-        progress.update(bar, completed=done, total=total)
-
-    with stopped_at_end(progress):
-        return draw(report)
 
 
 def _size(text: str) -> tuple[int, int]:

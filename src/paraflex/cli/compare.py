@@ -32,8 +32,8 @@ def compare_command(request: CompareRequest) -> int:
             with folder.added_files() as new:
                 save_overlays(found, new / "figures")
     print_results(found.to_dict(), lambda out: print_compared(out, found), as_json=request.json, findings=())
-    if request.out is not None and not request.json:
-        print_location(began, "numbers and figures", Path(request.out))
+    if request.out is not None:
+        print_location(began, "numbers and figures", Path(request.out), as_json=request.json)
     return COMPLETE
 
 

@@ -18,7 +18,7 @@ from paraflex.dynamics import build_system, consistent_state
 from paraflex.errors import InputError, renamed
 from paraflex.figures.methods import tables
 from paraflex.files import Model
-from paraflex.folders import COMPARISON, ResultsFolder
+from paraflex.folders import COMPARISON
 from paraflex.formatting import number
 from paraflex.integrators import METHODS
 from paraflex.integrators.methods import find_method
@@ -35,41 +35,28 @@ def compare_methods_command(request: CompareMethodsRequest) -> int:
     # All checks that need no computation come before the long runs.
     mode = _mode(model, request)
     with hold_results(request.out, COMPARISON, force=request.force) as folder:
-        return _compare(request, model, mode, methods, options, folder)
-
-
-def _compare(
-    request: CompareMethodsRequest,
-    model: Model,
-    mode: str | None,
-    methods: list[str],
-    options: ComparisonOptions,
-    folder: ResultsFolder,
-) -> int:
-    """Run all methods in a mode, None without a path; write results into the held folder and return the exit code."""
-    console = PlainConsole(stderr=True)
-    compile_kernels_for(model.mechanism, console.print)
-    began = time.perf_counter()
-    if mode is None:
-        case = _motion(model, request)
-    else:
-        path, name = find_path(model, request.path)
-        case = tracking_case(plan_study(model, model.mechanism, path, name, request.plan), mode)
-    requested = {"limit": options.limit, "repetitions": options.repetitions}
-    requested |= {"tolerances": list(options.tolerances), "steps": list(options.steps), "case": case.name}
-    study = ComparisonStudy(case, methods, options, command_provenance(model, requested))
-    with counting(console) as report:
-        comparison = study.run(on_progress=report)
-    summary = comparison.to_dict()
-    if comparison.measurements:
-        comparison.save_in(folder)
-    print_results(summary, lambda out: print_comparison(out, summary), as_json=request.json, findings=())
-    if comparison.measurements:
-        write_drawn(summary, folder)
-        if not request.json:
-            print_location(began, "numbers and figure", folder.path)
-    done = any(run.status == "complete" for run in comparison.measurements)
-    return exit_code(done, interrupted=comparison.interrupted)
+        console = PlainConsole(stderr=True)
+        compile_kernels_for(model.mechanism, console.print)
+        began = time.perf_counter()
+        if mode is None:
+            case = _motion(model, request)
+        else:
+            path, name = find_path(model, request.path)
+            case = tracking_case(plan_study(model, model.mechanism, path, name, request.plan), mode)
+        requested = {"limit": options.limit, "repetitions": options.repetitions}
+        requested |= {"tolerances": list(options.tolerances), "steps": list(options.steps), "case": case.name}
+        study = ComparisonStudy(case, methods, options, command_provenance(model, requested))
+        with counting(console) as report:
+            comparison = study.run(on_progress=report)
+        summary = comparison.to_dict()
+        if comparison.measurements:
+            comparison.save_in(folder)
+        print_results(summary, lambda out: print_comparison(out, summary), as_json=request.json, findings=())
+        if comparison.measurements:
+            write_drawn(summary, folder)
+            print_location(began, "numbers and figure", folder.path, as_json=request.json)
+        done = any(run.status == "complete" for run in comparison.measurements)
+        return exit_code(done, interrupted=comparison.interrupted)
 
 
 def _options(request: CompareMethodsRequest) -> ComparisonOptions:

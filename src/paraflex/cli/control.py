@@ -28,7 +28,7 @@ from paraflex.compilation import compile_kernels_for
 from paraflex.control import ControllerDescription
 from paraflex.figures.laws import law_table
 from paraflex.files import Model
-from paraflex.folders import LAW_COMPARISON, ResultsFolder
+from paraflex.folders import LAW_COMPARISON
 from paraflex.kinematics import Path
 from paraflex.mechanism import ActuationMode
 from paraflex.results.following import ErrorSpan
@@ -48,31 +48,23 @@ def compare_laws_command(request: CompareLawsRequest) -> int:
     paths, modes = find_paths(model, request.paths), find_modes(model, request.modes)
     # All checks that need no computation come before the long runs.
     with hold_results(request.out, LAW_COMPARISON, force=request.force, field="--output") as folder:
-        return _compare(request, model, laws, paths, modes, folder)
-
-
-def _compare(
-    request: CompareLawsRequest, model: Model, laws: Laws, paths: Paths, modes: list[ActuationMode],
-    folder: ResultsFolder,
-) -> int:  # fmt: skip
-    console = PlainConsole(stderr=True)
-    compile_kernels_for(model.mechanism, console.print)
-    began = time.perf_counter()
-    study = _study(request, model, laws, paths, modes)
-    with counting(console) as report:
-        result = study.run(workers=Workers(number=request.workers), on_progress=report)
-    if not result.begun:
-        console.print_lines("interrupted before any law had run; nothing is written")
-        return exit_code(False, interrupted=result.interrupted)
-    result.save_in(folder)
-    findings = collected(
-        check_planned(model, next(iter(study.tasks.values())), next(iter(paths)), modes, request.plan.assembly)
-    )
-    print_results(result.to_dict(), lambda out: print_laws(out, result), as_json=request.json, findings=findings)
-    write_drawn(result.data, folder)
-    if not request.json:
-        print_location(began, "table and figure", folder.path)
-    return exit_code(bool((result.data["status"] == "complete").any()), interrupted=result.interrupted)
+        console = PlainConsole(stderr=True)
+        compile_kernels_for(model.mechanism, console.print)
+        began = time.perf_counter()
+        study = _study(request, model, laws, paths, modes)
+        with counting(console) as report:
+            result = study.run(workers=Workers(number=request.workers), on_progress=report)
+        if not result.begun:
+            console.print_lines("interrupted before any law had run; nothing is written")
+            return exit_code(False, interrupted=result.interrupted)
+        result.save_in(folder)
+        findings = collected(
+            check_planned(model, next(iter(study.tasks.values())), next(iter(paths)), modes, request.plan.assembly)
+        )
+        print_results(result.to_dict(), lambda out: print_laws(out, result), as_json=request.json, findings=findings)
+        write_drawn(result.data, folder)
+        print_location(began, "table and figure", folder.path, as_json=request.json)
+        return exit_code(bool((result.data["status"] == "complete").any()), interrupted=result.interrupted)
 
 
 def _study(request: CompareLawsRequest, model: Model, laws: Laws, paths: Paths, modes: list[ActuationMode]) -> LawStudy:

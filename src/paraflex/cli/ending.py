@@ -19,6 +19,7 @@ from paraflex.errors import OutputError
 from paraflex.findings import Finding
 from paraflex.folders import RESULT_KINDS, ResultsFolder
 from paraflex.results import save_results
+from paraflex.results.kinds import kind_of
 from paraflex.writing import write_json
 
 _LATER = "paraflex plot and paraflex report draw them"
@@ -62,9 +63,10 @@ def print_results(
         show(out)
 
 
-def print_location(began: float, what: str, folder: Path, drawn: DrawnChoice | None = None) -> None:
-    """Print the last line of a command: elapsed time, and folder of the results."""
-    PlainConsole(stderr=True).print_lines(where(began, what, folder, drawn))
+def print_location(began: float, what: str, folder: Path, drawn: DrawnChoice | None = None, *, as_json: bool) -> None:
+    """Print the last line of a command, unless it prints JSON: elapsed time, and folder of the results."""
+    if not as_json:
+        PlainConsole(stderr=True).print_lines(where(began, what, folder, drawn))
 
 
 def where(began: float, what: str, folder: Path, drawn: DrawnChoice | None = None) -> str:
@@ -75,16 +77,12 @@ def where(began: float, what: str, folder: Path, drawn: DrawnChoice | None = Non
     return f"{time.perf_counter() - began:.1f} s; {what} in {folder}"
 
 
-def write_numbers(
-    data: xr.Dataset,
-    summary: dict[str, Any],
-    folder: ResultsFolder,
-    names: tuple[str, str] = ("results.nc", "summary.json"),
-) -> None:
-    """Write a dataset and its summary in place of earlier results; the default names are those of a run."""
+def write_numbers(data: xr.Dataset, summary: dict[str, Any], folder: ResultsFolder) -> None:
+    """Write a dataset and its summary in place of earlier results."""
+    kind = RESULT_KINDS[kind_of(data)]
     with folder.replaced() as new:
-        save_results(data, new / names[0])
-        write_json(new / names[1], summary)
+        save_results(data, new / kind.data)
+        write_json(new / kind.files[0], summary)
 
 
 def write_drawn(results: xr.Dataset | Mapping[str, Any], folder: ResultsFolder, drawn: DrawnChoice = _FIGURES) -> None:
@@ -132,14 +130,14 @@ def give_dataset(
     findings : iterable of Finding, optional
         Findings printed before the tables; by default those of the summary's verdict.
     """
-    began, files = time.perf_counter(), RESULT_KINDS[kind]
-    with nullcontext() if chosen.out is None else hold_results(chosen.out, files.folder, force=chosen.force) as folder:
+    began, place = time.perf_counter(), RESULT_KINDS[kind].folder
+    with nullcontext() if chosen.out is None else hold_results(chosen.out, place, force=chosen.force) as folder:
         data = make()
         numbers = summary(data)
         print_results(numbers, lambda out: show(out, data), as_json=chosen.json, findings=findings)
         if folder is not None:
-            write_numbers(data, numbers, folder, (files.data, files.files[0]))
+            write_numbers(data, numbers, folder)
             write_drawn(data, folder, chosen.drawn)
-    if folder is not None and not chosen.json:
-        print_location(began, "numbers", folder.path, chosen.drawn)
+    if folder is not None:
+        print_location(began, "numbers", folder.path, chosen.drawn, as_json=chosen.json)
     return data

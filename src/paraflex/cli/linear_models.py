@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -14,6 +13,7 @@ from paraflex.cli.commands.models import LinearRequest
 from paraflex.cli.commands.options import PlanChoice
 from paraflex.cli.commands.requests import conflict, flagged
 from paraflex.cli.request import (
+    check_time,
     command_provenance,
     find_modes,
     find_path,
@@ -99,10 +99,8 @@ def _check(request: LinearRequest) -> None:
         for other, given in (("--pose", request.pose), ("--balanced", request.balanced or None)):
             if given is not None:
                 raise conflict(f"is about a motion, {other} about rest", flag, value)
-    if request.at is not None and not (math.isfinite(request.at) and request.at >= 0.0):
-        raise InputError(
-            "not a time of the motion", field="--at", value=request.at, remedy="give it in s, not negative"
-        )
+    if request.at is not None:
+        check_time(request.at)
     if request.along is not None and not 2 <= request.along <= _MOST_MOMENTS:
         raise InputError(
             "not a valid number of times",

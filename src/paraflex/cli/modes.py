@@ -20,6 +20,7 @@ from paraflex.errors import ActuationError
 from paraflex.figures.modes import mode_table
 from paraflex.files import Model
 from paraflex.mechanism import ActuationMode, mode_of_motors, parse_mode
+from paraflex.results.numbers import finite_or_none
 
 # Number of samples of the path at which modes are assessed.
 _SAMPLES = 201
@@ -67,9 +68,8 @@ def _row(mode: ActuationMode, effort: Effort | None) -> dict[str, Any]:
     row: dict[str, Any] = {"mode": mode.name, "motors": list(mode.motors)}
     if effort is None:
         return row
-    worst = float(np.max(actuation_condition(effort, mode)))
     row["redundancy"] = len(mode.motors) - effort.required.shape[1]
-    row["condition_max"] = worst if np.isfinite(worst) else None
+    row["condition_max"] = finite_or_none(np.max(actuation_condition(effort, mode)))
     try:
         check_mode(effort, mode)
         row["drives_path"] = True

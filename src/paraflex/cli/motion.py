@@ -11,7 +11,7 @@ from typing import Any
 from rich.progress import TimeElapsedColumn
 
 from paraflex.checks import check
-from paraflex.cli.bars import bars, stopped_at_end
+from paraflex.cli.bars import late_bar
 from paraflex.cli.collected import collected
 from paraflex.cli.commands.options import PlanChoice
 from paraflex.cli.commands.runs import RunRequest
@@ -30,7 +30,7 @@ from paraflex.figures.controllers import controller_table
 from paraflex.figures.reduction import reduced_words
 from paraflex.files import Model, StudyDefaults
 from paraflex.findings import DONE_STATUSES
-from paraflex.folders import RUN, ResultsFolder
+from paraflex.folders import RUN
 from paraflex.formatting import number, quantity
 from paraflex.integrators import IntegrationOptions
 from paraflex.mechanism import Mechanism
@@ -71,55 +71,47 @@ def run_motion(
             remedy="leave it out",
         )
     with hold_results(request.out, RUN, force=request.force) as folder:
-        return _run_held(request, replace(model, study=study), mechanism, options, how, folder)
+        console, model = PlainConsole(stderr=True), replace(model, study=study)
+        compile_kernels_for(mechanism, console.print)
+        began = time.perf_counter()
+        controllers = acting_controllers(model, request)
+        full = _simulate(console, model, mechanism, options, controllers, balanced=request.balanced)
+        run, kept = full, kept_coordinates(request, study)
+        # A full run that failed is no reference for a reduced one.
+        if kept is not None and full.solution.status in DONE_STATUSES:
+            few = reduced_as_requested(request, full, kept)
+            start = None
+            if not request.balanced:
+                start = nearest_state(build_system(few), full.system, _first(full))
+            run = _simulate(console, model, few, options, controllers, balanced=request.balanced, start=start)
+        requested = {
+            "duration": study.duration,
+            "samples": study.samples,
+            "controllers": controller_arguments(model, controllers),
+        }
+        parameters = command_provenance(model, requested | model_parameters(request, mechanism, kept) | how)
+        seen = check(model, assembly=request.plan.assembly)
+        data = motion_dataset(run, options=options, parameters=parameters, findings=collected(seen))
+        if run is not full:
+            sizes = [size_of(one.system, _first(one)) for one in (run, full)]
+            data = compared_with_full(data, motion_dataset(full, options=options), *sizes)
+        summary = motion_summary(data)
+        write_numbers(data, summary, folder)
+        print_results(summary, lambda out: _report(out, summary), as_json=request.json)
+        finished = run.solution.status in DONE_STATUSES
+        try:
+            write_drawn(data, folder, request.drawn)
+        finally:
+            if not finished:
+                message = run.solution.message
+                kept = run.solution.status == "interrupted"
+                console.print_lines(f"{message}; results until then are kept" if kept else f"error: {message}")
+        print_location(began, "results", folder.path, request.drawn, as_json=request.json)
+        return exit_code(finished, interrupted=run.solution.status == "interrupted")
 
 
-def _run_held(
-    request: RunRequest,
-    model: Model,
-    mechanism: Mechanism,
-    options: IntegrationOptions,
-    how: dict[str, Any],
-    folder: ResultsFolder,
-) -> int:
-    console, study = PlainConsole(stderr=True), model.study
-    compile_kernels_for(mechanism, console.print)
-    began = time.perf_counter()
-    controllers = acting_controllers(model, request)
-    full = _simulate(console, model, mechanism, options, controllers, balanced=request.balanced)
-    run, kept = full, kept_coordinates(request, study)
-    # A full run that failed is no reference for a reduced one.
-    if kept is not None and full.solution.status in DONE_STATUSES:
-        few = reduced_as_requested(request, full, kept)
-        start = None
-        if not request.balanced:
-            start = nearest_state(build_system(few), full.system, State(0.0, full.solution.q[0], full.solution.v[0]))
-        run = _simulate(console, model, few, options, controllers, balanced=request.balanced, start=start)
-    requested = {
-        "duration": study.duration,
-        "samples": study.samples,
-        "controllers": controller_arguments(model, controllers),
-    }
-    parameters = command_provenance(model, requested | model_parameters(request, mechanism, kept) | how)
-    seen = check(model, assembly=request.plan.assembly)
-    data = motion_dataset(run, options=options, parameters=parameters, findings=collected(seen))
-    if run is not full:
-        sizes = [size_of(one.system, State(0.0, one.solution.q[0], one.solution.v[0])) for one in (run, full)]
-        data = compared_with_full(data, motion_dataset(full, options=options), *sizes)
-    summary = motion_summary(data)
-    write_numbers(data, summary, folder)
-    print_results(summary, lambda out: _report(out, summary), as_json=request.json)
-    finished = run.solution.status in DONE_STATUSES
-    try:
-        write_drawn(data, folder, request.drawn)
-    finally:
-        if not finished:
-            message = run.solution.message
-            kept = run.solution.status == "interrupted"
-            console.print_lines(f"{message}; results until then are kept" if kept else f"error: {message}")
-    if not request.json:
-        print_location(began, "results", folder.path, request.drawn)
-    return exit_code(finished, interrupted=run.solution.status == "interrupted")
+def _first(run: MotionRun) -> State:
+    return State(0.0, run.solution.q[0], run.solution.v[0])
 
 
 def free_run(
@@ -149,20 +141,18 @@ def _simulate(
     balanced: bool = False,
     start: State | None = None,
 ) -> MotionRun:
-    study, progress = model.study, bars(console, TimeElapsedColumn())
-    bar = progress.add_task(mechanism.name, total=study.duration)
-
-    def report(reached: float) -> None:
-        progress.start()
-        progress.update(bar, completed=reached)
-
+    study = model.study
     try:
-        with locating_errors(model), stopped_at_end(progress), warnings.catch_warnings():
+        with (
+            locating_errors(model),
+            late_bar(console, mechanism.name, study.duration, TimeElapsedColumn()) as update,
+            warnings.catch_warnings(),
+        ):
             begun = start or start_of(model, mechanism, study.assembly, balanced=balanced) or study.assembly
             # The table and the summary report these findings.
             warnings.simplefilter("ignore", ValidityWarning)
             warnings.simplefilter("ignore", ResultWarning)
-            return free_run(model, mechanism, options, controllers, begun, report)
+            return free_run(model, mechanism, options, controllers, begun, lambda reached: update(completed=reached))
     except (IntegrationError, ControllerError) as error:
         return error.partial
 

@@ -17,7 +17,6 @@ from paraflex.designs.measure import beyond_limits, coarse_runs
 from paraflex.designs.sweep import SweepStudy
 from paraflex.figures.search import index_table
 from paraflex.formatting import number, quantity
-from paraflex.plots import save_figures
 from paraflex.studies import IndicesResult, SweepResult, load_indices, load_sweep
 
 
@@ -109,6 +108,8 @@ def indices_command(request: IndicesRequest) -> int:
         console.print_lines(f"indices: {result.table}; every run: {result.sweep.table}")
 
     print_results(numbers | {"verdict": verdict.to_dict()}, show, as_json=request.json, findings=verdict)
+    from paraflex.plots import save_figures  # its import takes a second
+
     save_figures(numbers, request.folder / "figures")
     return COMPLETE
 

@@ -52,22 +52,9 @@ def warn_of(console: PlainConsole, findings: Iterable[Finding], whose: str = "")
     printed(findings)
 
 
-def plain_table(
-    *texts: str,
-    numbers: Iterable[str] = (),
-    rows: Iterable[Iterable[str]] = (),
-    title: str | None = None,
-    wrapped: Iterable[str] = (),
-) -> Table:
-    """Return a table without frames: columns of text, of which the `wrapped` ones may be broken, then of numbers."""
-    table = Table(title=title, title_justify="left", box=box.SIMPLE, collapse_padding=True, pad_edge=False)
-    for heading in texts:
-        table.add_column(heading, no_wrap=heading not in wrapped)
-    for heading in numbers:
-        table.add_column(heading, justify="right", no_wrap=True)
-    for row in rows:
-        table.add_row(*row)
-    return table
+def plain_table(title: str | None = None) -> Table:
+    """Return a table without frames."""
+    return Table(title=title, title_justify="left", box=box.SIMPLE, collapse_padding=True, pad_edge=False)
 
 
 def framed_table(title: str, headings: Iterable[str], right: Container[int] = ()) -> Table:
@@ -113,7 +100,9 @@ def print_table(console: PlainConsole, shown: DescribedTable, title: str | None 
                              no_wrap=widths[c] <= _WRAPPED)  # fmt: skip
         for row in zip(*(texts[c] for c in kept), strict=True):
             table.add_row(*row)
-        print_titled(console, "continued" if k else shown.title if title is None else title, table)
+        # A title of the table itself would be broken at the width of the table.
+        console.print("continued" if k else shown.title if title is None else title, soft_wrap=True)
+        console.print(table)
 
 
 def _fitting(widths: Sequence[int], first: int, room: int) -> Iterator[list[int]]:
@@ -127,12 +116,6 @@ def _fitting(widths: Sequence[int], first: int, room: int) -> Iterator[list[int]
         part.append(c)
         left -= widths[c]
     yield part
-
-
-def print_titled(console: PlainConsole, title: str, table: Table) -> None:
-    """Print a table below a title, which is not broken at the table's width as Rich does with a table's own title."""
-    console.print_lines(title)
-    console.print(table)
 
 
 def few(names: Sequence[Any], most: int) -> str:
