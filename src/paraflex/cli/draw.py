@@ -32,6 +32,8 @@ if TYPE_CHECKING:
     from paraflex.results.posed import Posed
 
 FORMATS = (".html", ".svg", ".png", ".pdf")
+# Directions of a joint's coordinate that grows, and of one that falls.
+_SLIDING, _TURNING = ("along its axis", "against its axis"), ("anticlockwise", "clockwise")
 # Resolution of PNG [dots per inch], and largest number of rows of a table.
 _DPI, _LISTED = 200.0, 12
 _PAGE = """<!doctype html>
@@ -49,10 +51,8 @@ def draw_command(request: DrawRequest) -> int:
     output = None if request.output is None else Path(request.output)
     if output is not None:
         if output.suffix.lower() not in FORMATS:
-            raise InputError(
-                "unknown kind of drawing", field="--output", value=request.output,
-                remedy="end it in .html, .svg, .png or .pdf",
-            )  # fmt: skip
+            remedy = "end it in .html, .svg, .png or .pdf"
+            raise InputError("unknown kind of drawing", field="--output", value=request.output, remedy=remedy)
         refuse_existing(output, request.force)
     model = requested_model(request.model)
     shown = pose_of(model, assembly=request.assembly, path=request.path)
@@ -98,7 +98,10 @@ def _print_result(console: PlainConsole, model: Model, shown: Posed, request: Dr
     console.print_lines(f"{mechanism.name} ({model.source})")
     console.print(_joints(mechanism, shown))
     console.print_lines(f"bodies: {few([body.name for body in mechanism.bodies], _LISTED)}")
-    console.print_lines(*_drives(mechanism, shown), *_loads(mechanism, shown))
+    console.print_lines(*_drives(mechanism, shown))
+    for load in mechanism.loads[:_LISTED]:
+        size = acting_load(load, shown.duration).size
+        console.print_lines(f"load {load.name}: {load.kind} at {load.point}, {size}")
     if mechanism.sensors:
         sensors = [f"{one.name} ({one.kind})" for one in mechanism.sensors]
         console.print_lines(f"sensors: {few(sensors, _LISTED)}")
@@ -122,19 +125,11 @@ def _drives(mechanism: Mechanism, shown: Posed) -> list[str]:
         if not sign:
             lines.append(f"prescribed {drive.name}: {drive.joint} is held")
             continue
-        if joint.slides:
-            way = "along its axis" if sign > 0 else "against its axis"
-        else:
-            way = "anticlockwise" if sign > 0 else "clockwise"
+        forwards, backwards = _SLIDING if joint.slides else _TURNING
+        way = forwards if sign > 0 else backwards
         speed = drive_speed(drive, joint.slides, shown.duration)
         lines.append(f"prescribed {drive.name}: {joint.b.body} at {drive.joint} {way}, {speed}")
     return lines
-
-
-def _loads(mechanism: Mechanism, shown: Posed) -> list[str]:
-    """Return a line for each load with its magnitude."""
-    sizes = [acting_load(load, shown.duration) for load in mechanism.loads[:_LISTED]]
-    return [f"load {one.load.name}: {one.load.kind} at {one.load.point}, {one.size}" for one in sizes]
 
 
 def _joints(mechanism: Mechanism, shown: Posed) -> Table:
