@@ -7,7 +7,6 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import partial
-from typing import Any
 
 from rich.progress import TimeElapsedColumn
 
@@ -17,7 +16,7 @@ from paraflex.cli.bars import bars
 from paraflex.cli.collected import apart, collected
 from paraflex.cli.commands.runs import RunRequest
 from paraflex.cli.ending import exit_code, print_results, where, write_drawn, write_numbers
-from paraflex.cli.integration import kept_coordinates, model_parameters, reduced_as_requested
+from paraflex.cli.integration import kept_coordinates, reduced_as_requested, run_parameters
 from paraflex.cli.request import acting_controllers, command_provenance, controller_arguments, located_error, plan_study
 from paraflex.cli.run_lines import failures, print_runs
 from paraflex.cli.stops import check_stops
@@ -56,12 +55,8 @@ def run_along(
     paths: Mapping[str, tuple[Path, ResultsFolder]],
     modes: list[ActuationMode],
     options: IntegrationOptions,
-    how: dict[str, Any],
 ) -> int:
-    """Run along paths and write results into the folders held for them; return the exit code.
-
-    The integration settings `how` are stored with the results.
-    """
+    """Run along paths and write results into the folders held for them; return the exit code."""
     console = PlainConsole(stderr=True)
     if request.segments is None:
         check_stops(mechanism, options, request.stop_at)
@@ -85,7 +80,7 @@ def run_along(
             "controllers": controller_arguments(model, controllers),
         }
         kept = kept_coordinates(request, model.study)
-        parameters = command_provenance(model, run | model_parameters(request, task.mechanism, kept) | how)
+        parameters = command_provenance(model, run | run_parameters(request, task.mechanism, options, kept))
         findings = check_planned(model, task, name, modes, request.plan.assembly)
         method, error = own_method(request, options, controllers), model.study.error
         study = TrackingStudy(

@@ -105,15 +105,13 @@ def _print_result(console: PlainConsole, model: Model, shown: Posed, request: Dr
     if mechanism.sensors:
         sensors = [f"{one.name} ({one.kind})" for one in mechanism.sensors]
         console.print_lines(f"sensors: {few(sensors, _LISTED)}")
-    for problem in shown.problems:
-        console.print_lines(f"warning: {problem}")
+    console.print_lines(*(f"warning: {problem}" for problem in shown.problems))
     if shown.gaps:
         listed = ", ".join(f"{name} by {gap}" for name, gap in shown.gaps.items())
         console.print_lines(f"drawn as given, with open joints: {listed}")
-    console.print_lines(f"drawn in {output}")
     name = request.model.name
     then = "run" if model.statics == StaticsDefaults() else "statics"
-    console.print_lines(f"next: paraflex info {name}, paraflex {then} {name}")
+    console.print_lines(f"drawn in {output}", f"next: paraflex info {name}, paraflex {then} {name}")
 
 
 def _drives(mechanism: Mechanism, shown: Posed) -> list[str]:

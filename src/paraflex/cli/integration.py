@@ -84,9 +84,11 @@ def _parameter(text: str) -> tuple[str, float]:
     return name.strip(), number_in_option(value, "--method-parameter", text)
 
 
-def model_parameters(request: RunRequest, mechanism: Mechanism, reduced: int | None) -> dict[str, Any]:
-    """Return the settings of a run other than its integration, for provenance; `mechanism` is the one that ran."""
-    return {
+def run_parameters(
+    request: RunRequest, mechanism: Mechanism, options: IntegrationOptions, reduced: int | None
+) -> dict[str, Any]:
+    """Return the settings of a run, for provenance; `mechanism` is the one that ran."""
+    found = {
         "rigid": request.rigid,
         "segments": request.segments,
         "reduced": reduced,
@@ -96,11 +98,9 @@ def model_parameters(request: RunRequest, mechanism: Mechanism, reduced: int | N
         "max_steps": request.max_steps,
         "geometry": mechanism.geometry.value,
     } | asdict(request.frames)
-
-
-def integration_parameters(options: IntegrationOptions, stop_at: Sequence[str]) -> dict[str, Any]:
-    """Return the integration settings of a run, for provenance."""
-    return {
+    if request.ked:  # its steps are fixed
+        return found
+    return found | {
         "tolerance": options.tolerance,
         "tolerance_per": options.tolerance_per and options.tolerance_per.value,
         "control": options.control and options.control.value,
@@ -111,7 +111,7 @@ def integration_parameters(options: IntegrationOptions, stop_at: Sequence[str]) 
         "step": options.step,
         "constraints": options.treatment.value,
         "automatic_gains": options.automatic_gains,
-        "stop_at": list(stop_at),
+        "stop_at": list(request.stop_at),
     }
 
 

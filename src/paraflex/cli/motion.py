@@ -16,7 +16,7 @@ from paraflex.cli.collected import collected
 from paraflex.cli.commands.options import PlanChoice
 from paraflex.cli.commands.runs import RunRequest
 from paraflex.cli.ending import exit_code, print_location, print_results, write_drawn, write_numbers
-from paraflex.cli.integration import kept_coordinates, model_parameters, reduced_as_requested
+from paraflex.cli.integration import kept_coordinates, reduced_as_requested, run_parameters
 from paraflex.cli.replacing import hold_results
 from paraflex.cli.request import acting_controllers, command_provenance, controller_arguments, locating_errors
 from paraflex.cli.run_lines import load_lines
@@ -48,14 +48,8 @@ _MOST_POINTS = 20
 _ROUNDING = 1e-12
 
 
-def run_motion(
-    request: RunRequest,
-    model: Model,
-    mechanism: Mechanism,
-    options: IntegrationOptions,
-    how: dict[str, Any],
-) -> int:
-    """Run a mechanism's own motion, write results with the integration settings `how`; return the exit code."""
+def run_motion(request: RunRequest, model: Model, mechanism: Mechanism, options: IntegrationOptions) -> int:
+    """Run a mechanism's own motion and write results; return the exit code."""
     study = own_motion(model, request.plan)
     if request.modes:
         raise InputError(
@@ -89,7 +83,7 @@ def run_motion(
             "samples": study.samples,
             "controllers": controller_arguments(model, controllers),
         }
-        parameters = command_provenance(model, requested | model_parameters(request, mechanism, kept) | how)
+        parameters = command_provenance(model, requested | run_parameters(request, mechanism, options, kept))
         seen = check(model, assembly=request.plan.assembly)
         data = motion_dataset(run, options=options, parameters=parameters, findings=collected(seen))
         if run is not full:
