@@ -18,9 +18,9 @@ from paraflex.cli import COMPLETE
 from paraflex.cli.commands.models import DrawRequest
 from paraflex.cli.replacing import refuse_existing
 from paraflex.cli.request import requested_model
-from paraflex.cli.tables import PlainConsole, few, framed_table
+from paraflex.cli.tables import PlainConsole, framed_table
 from paraflex.equilibria.conditions import StaticsDefaults
-from paraflex.errors import InputError
+from paraflex.errors import InputError, listed
 from paraflex.files import Model
 from paraflex.mechanism import Mechanism
 from paraflex.results.acting import acting_load, drive_speed
@@ -97,18 +97,18 @@ def _print_result(console: PlainConsole, model: Model, shown: Posed, request: Dr
     mechanism = model.mechanism
     console.print_lines(f"{mechanism.name} ({model.source})")
     console.print(_joints(mechanism, shown))
-    console.print_lines(f"bodies: {few([body.name for body in mechanism.bodies], _LISTED)}")
+    console.print_lines(f"bodies: {listed([body.name for body in mechanism.bodies], _LISTED)}")
     console.print_lines(*_drives(mechanism, shown))
     for load in mechanism.loads[:_LISTED]:
         size = acting_load(load, shown.duration).size
         console.print_lines(f"load {load.name}: {load.kind} at {load.point}, {size}")
     if mechanism.sensors:
         sensors = [f"{one.name} ({one.kind})" for one in mechanism.sensors]
-        console.print_lines(f"sensors: {few(sensors, _LISTED)}")
+        console.print_lines(f"sensors: {listed(sensors, _LISTED)}")
     console.print_lines(*(f"warning: {problem}" for problem in shown.problems))
     if shown.gaps:
-        listed = ", ".join(f"{name} by {gap}" for name, gap in shown.gaps.items())
-        console.print_lines(f"drawn as given, with open joints: {listed}")
+        gaps = ", ".join(f"{name} by {gap}" for name, gap in shown.gaps.items())
+        console.print_lines(f"drawn as given, with open joints: {gaps}")
     name = request.model.name
     then = "run" if model.statics == StaticsDefaults() else "statics"
     console.print_lines(f"drawn in {output}", f"next: paraflex info {name}, paraflex {then} {name}")

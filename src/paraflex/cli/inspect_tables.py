@@ -8,7 +8,8 @@ from typing import Any
 from rich.padding import Padding
 from rich.table import Table
 
-from paraflex.cli.tables import PlainConsole, few, framed_table
+from paraflex.cli.tables import PlainConsole, framed_table
+from paraflex.errors import listed
 from paraflex.files import generator_names
 from paraflex.findings import Level
 from paraflex.mechanism import Mechanism, groups_of
@@ -39,10 +40,10 @@ def print_facts(facts: dict[str, Any]) -> None:
     if facts["description"]:
         console.print(facts["description"])
     console.print(_counts(facts))
-    loops = [f"loop {k + 1}: {few(loop, _LISTED)}" for k, loop in enumerate(facts["loops"])]
+    loops = [f"loop {k + 1}: {listed(loop, _LISTED)}" for k, loop in enumerate(facts["loops"])]
     _print_some(console, loops, facts["loop_count"], " loops")
     redundancies = [
-        f"redundant: {one['row']}, among {few(one['among'], _LISTED)}" for one in facts.get("redundancies", [])
+        f"redundant: {one['row']}, among {listed(one['among'], _LISTED)}" for one in facts.get("redundancies", [])
     ]
     _print_some(console, redundancies, len(redundancies))
     _print_starts(console, facts)
@@ -101,7 +102,7 @@ def _counts(facts: dict[str, Any]) -> Table:
                 table.add_row(label, f"{value:g}, including its payload")
                 table.add_row("payload", _payload(facts["payload"]))
                 continue
-            table.add_row(label, (few(value, _LISTED) or "none") if isinstance(value, list) else f"{value:g}")
+            table.add_row(label, (listed(value, _LISTED) or "none") if isinstance(value, list) else f"{value:g}")
     return table
 
 
@@ -126,7 +127,7 @@ def _print_starts(console: PlainConsole, facts: dict[str, Any]) -> None:
     for start in facts["starts"]:
         numbers = ["" if start[key] is None else f"{start[key]:.2g}" for key in ("gap_before", "position", "velocity")]
         gap = "none" if start["closes"] else (f"{start['gap']:.3g}" if start["gap"] else "")
-        table.add_row(start["assembly"], *numbers, gap, few(start["where"], _LISTED))
+        table.add_row(start["assembly"], *numbers, gap, listed(start["where"], _LISTED))
     if facts["starts"]:
         console.print(table)
 
@@ -139,7 +140,7 @@ def _print_drives(console: PlainConsole, facts: dict[str, Any]) -> None:
     sets = [" ".join(motors) for motors in drives["minimal_sets"]]
     if sets:
         more = " at least" if drives["more_sets"] else ""
-        console.print_lines(f"sets of motors that suffice,{more} {len(sets)}: {few(sets, _LISTED)}")
+        console.print_lines(f"sets of motors that suffice,{more} {len(sets)}: {listed(sets, _LISTED)}")
 
 
 def _links(facts: dict[str, Any]) -> Table:

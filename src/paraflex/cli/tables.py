@@ -116,9 +116,3 @@ def _fitting(widths: Sequence[int], first: int, room: int) -> Iterator[list[int]
         part.append(c)
         left -= widths[c]
     yield part
-
-
-def few(names: Sequence[Any], most: int) -> str:
-    """Return the first `most` names as text, and how many more there are."""
-    more = f" and {len(names) - most} more" if len(names) > most else ""
-    return f"{', '.join(map(str, names[:most]))}{more}"
