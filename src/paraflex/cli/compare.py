@@ -5,7 +5,6 @@ from __future__ import annotations
 import time
 from pathlib import Path
 
-from paraflex.cli import COMPLETE
 from paraflex.cli.commands.requests import flagged
 from paraflex.cli.commands.results import CompareRequest
 from paraflex.cli.ending import print_location, print_results
@@ -17,8 +16,8 @@ from paraflex.results.comparison import RunComparison, compare
 from paraflex.writing import write_json
 
 
-def compare_command(request: CompareRequest) -> int:
-    """Compare two runs, print the differences and, with --out, write them to files; return the exit code."""
+def compare_command(request: CompareRequest) -> None:
+    """Compare two runs, print the differences and, with --out, write them to files."""
     began = time.perf_counter()
     with flagged(request):
         found = compare(request.first, request.second, request.modes)
@@ -34,7 +33,6 @@ def compare_command(request: CompareRequest) -> int:
     print_results(found.to_dict(), lambda out: print_compared(out, found), as_json=request.json, findings=())
     if request.out is not None:
         print_location(began, "numbers and figures", Path(request.out), as_json=request.json)
-    return COMPLETE
 
 
 def print_compared(console: PlainConsole, found: RunComparison) -> None:

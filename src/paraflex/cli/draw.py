@@ -14,7 +14,6 @@ from typing import TYPE_CHECKING
 from rich.table import Table
 
 from paraflex.checks.drawing import pose_of
-from paraflex.cli import COMPLETE
 from paraflex.cli.commands.models import DrawRequest
 from paraflex.cli.replacing import refuse_existing
 from paraflex.cli.request import requested_model
@@ -46,8 +45,8 @@ svg {{ width: 100%; height: auto; max-height: 92vh }} p.open {{ color: #c8102e }
 """
 
 
-def draw_command(request: DrawRequest) -> int:
-    """Draw the mechanism and print the name of the file; return the exit code."""
+def draw_command(request: DrawRequest) -> None:
+    """Draw the mechanism and print the name of the file."""
     output = None if request.output is None else Path(request.output)
     if output is not None:
         if output.suffix.lower() not in FORMATS:
@@ -66,7 +65,6 @@ def draw_command(request: DrawRequest) -> int:
     opens = (request.output is None and _has_screen()) if request.open is None else request.open
     if opens and not webbrowser.open(output.resolve().as_uri()):
         PlainConsole(stderr=True).print_lines("no browser opens it here")
-    return COMPLETE
 
 
 def _write(figure: Figure, shown: Posed, output: Path) -> None:

@@ -13,8 +13,8 @@ from paraflex.results.export import export, export_table
 _TABLE = "results.parquet"
 
 
-def export_command(request: ExportRequest) -> int:
-    """Write the files; return the exit code."""
+def export_command(request: ExportRequest) -> None:
+    """Write the files."""
     results = Path(request.results)
     folder = results if results.is_dir() else results.parent
     output = folder / "export" if request.output is None else Path(request.output)
@@ -28,4 +28,3 @@ def export_command(request: ExportRequest) -> int:
     console = PlainConsole(stderr=True)
     for file in files:
         console.print_lines(f"{file} ({file.stat().st_size / 1e6:.3g} MB)")
-    return 0

@@ -5,7 +5,6 @@ from __future__ import annotations
 import numpy as np
 import xarray as xr
 
-from paraflex.cli import COMPLETE
 from paraflex.cli.commands.models import LineariseRequest, ReduceRequest
 from paraflex.cli.commands.requests import flagged
 from paraflex.cli.ending import give_dataset
@@ -25,8 +24,8 @@ from paraflex.results.reduction_summary import reduction_summary
 _METHODS = (ReductionMethod.CRAIG_BAMPTON.value, ReductionMethod.MODAL.value)
 
 
-def linearise_command(request: LineariseRequest) -> int:
-    """Linearise in every mode, print poles and zeros and, with --out, write files; return the exit code."""
+def linearise_command(request: LineariseRequest) -> None:
+    """Linearise in every mode, print poles and zeros and, with --out, write files."""
     make = requested_models(request, "linearise")
 
     def data() -> xr.Dataset:
@@ -36,7 +35,6 @@ def linearise_command(request: LineariseRequest) -> int:
             return linear_dataset(found.models, along=along, parameters=found.parameters)
 
     give_dataset("linear", data, linear_summary, _print_models, request.files, findings=())
-    return COMPLETE
 
 
 def _print_models(out: PlainConsole, data: xr.Dataset) -> None:
@@ -57,8 +55,8 @@ def _print_models(out: PlainConsole, data: xr.Dataset) -> None:
     out.print_lines(*remarks(data))
 
 
-def reduce_command(request: ReduceRequest) -> int:
-    """Reduce the models of every mode, print the results and, with --out, write files; return the exit code."""
+def reduce_command(request: ReduceRequest) -> None:
+    """Reduce the models of every mode, print the results and, with --out, write files."""
     make = requested_models(request, "reduce")
 
     def data() -> xr.Dataset:
@@ -73,7 +71,6 @@ def reduce_command(request: ReduceRequest) -> int:
             )  # fmt: skip
 
     give_dataset("reduction", data, reduction_summary, _print_reduction, request.files, findings=())
-    return COMPLETE
 
 
 def _along(found: RequestedModels, request: ReduceRequest) -> list[PosesAlong]:

@@ -31,7 +31,7 @@ class ListedCommand(NamedTuple):
     help: str
 
     def answer(self, request: Any) -> int | None:
-        """Carry out a request; return the exit code."""
+        """Carry out a request; return the exit code, None for that of success."""
         module, _, function = self.function.partition(".")
         do = getattr(import_module(f"paraflex.cli.{module}"), function)
         try:
