@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from paraflex.cli.commands.runs import RunRequest
-from paraflex.cli.integration import integration_options, parse_event
+from paraflex.cli.integration import integration_options
+from paraflex.cli.stops import parse_event
 from paraflex.errors import InputError
 from paraflex.files import StudyDefaults, library_text, load
 from paraflex.integrators import METHODS, DeflectionLimit, JointLimit, SingularDistance

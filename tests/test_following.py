@@ -6,9 +6,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from rich.console import Console
 
-from paraflex.cli.tables import below_tolerance
+from paraflex.cli.run_lines import below_tolerance
+from paraflex.cli.tables import PlainConsole
 from paraflex.dynamics import (
     across_chord,
     build_system,
@@ -347,7 +347,7 @@ def test_tracking_errors_below_the_tolerance_are_named():
 
 def test_the_command_names_them_unless_steps_are_fixed():
     said = StringIO()
-    out = Console(file=said, width=200)
+    out = PlainConsole(file=said, width=200)
     modes = {"++": {"tracking_rms_motion": 1e-7}}
     for settings in ({"step": None, "tolerance": 1e-6}, {"step": 1e-4, "tolerance": 1e-6}):
         below_tolerance(out, {"line": {"error": "motion", "parameters": {"run": settings}}}, modes)

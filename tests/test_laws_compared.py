@@ -12,9 +12,9 @@ from matplotlib.colors import to_hex
 import paraflex as pf
 from paraflex import plots
 from paraflex.campaign import Workers
-from paraflex.cli.commands.control import CompareLawsRequest
-from paraflex.cli.control_tables import print_laws
-from paraflex.cli.tables import plain_console
+from paraflex.cli.commands.runs import CompareLawsRequest
+from paraflex.cli.control import print_laws
+from paraflex.cli.tables import PlainConsole
 from paraflex.control import ControllerDescription, simulate_controlled
 from paraflex.control.laws.joints import internal_torques
 from paraflex.errors import InputError
@@ -361,7 +361,7 @@ def test_the_command_prints_a_block_for_each_mode(done, compared):
 
 
 def test_what_has_room_is_one_table(compared, capsys):
-    console = plain_console()
+    console = PlainConsole()
     console.width = 200
     print_laws(console, compared)
     printed = capsys.readouterr().out

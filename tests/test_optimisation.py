@@ -10,14 +10,14 @@ from types import SimpleNamespace
 import numpy as np
 import pandas as pd
 import pytest
-from rich.console import Console
 
 import paraflex as pf
 from journals import forge, rows_in
 from made_up import STUDY, made_up, write_study
 from paraflex.campaign import open_engine
 from paraflex.campaign.journal import write_journal
-from paraflex.cli.optimise import _report as report
+from paraflex.cli.search import _report_optimum as report
+from paraflex.cli.tables import PlainConsole
 from paraflex.designs.run import run_task
 from paraflex.errors import InputError, OutputError
 from paraflex.files import library_names, load_data
@@ -96,7 +96,7 @@ def test_a_limit_nothing_holds_is_named_with_its_unit(capsys):
         metrics={"stress_max": 2.5e7, "total_mass": 1.0}, start_metrics={"stress_max": 3e7, "total_mass": 2.0},
         goal={"limits": (("stress_max", 1e7), ("total_mass", 1.5))}, units={"stress_max": "Pa", "total_mass": "kg"},
     )  # fmt: skip
-    report(Console(width=100), found)
+    report(PlainConsole(width=100), found)
     lines = capsys.readouterr().out.splitlines()
     assert [line for line in lines if line.startswith("limit")] == [
         "limit exceeded: largest stress is above 10 MPa by 15 MPa"

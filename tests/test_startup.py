@@ -77,12 +77,12 @@ def test_commands_import_what_draws_once_there_are_numbers():
     """One after the other in one process: the first that imports too much is named, with what."""
     look = """
 import importlib, sys
-for command in ("run", "verify", "motion", "linearise"):
+for command in ("run", "verify", "motion", "linear"):
     importlib.import_module(f"paraflex.cli.{command}")
     print(command, *set(sys.argv) & set(sys.modules))
 """
     found = python("-c", look, "matplotlib", "paraflex.report", "paraflex.plots.save")
-    assert found == ["run", "verify", "motion", "linearise"]
+    assert found == ["run", "verify", "motion", "linear"]
 
 
 def test_imports_compile_nothing(tmp_path):

@@ -157,10 +157,10 @@ def suggestion(name: object, known: Iterable[str]) -> str:
     return f"choose from {listed(known)}" if known else "there is none to choose from"
 
 
-def listed(names: Sequence[str]) -> str:
-    """Join names for a message; beyond 60, only the first 60 and the number of others."""
-    more = f" and {len(names) - _LISTED} more" if len(names) > _LISTED else ""
-    return ", ".join(names[:_LISTED]) + more
+def listed(names: Sequence[object], most: int = _LISTED) -> str:
+    """Join names for a message; beyond `most`, only the first ones and the number of others."""
+    more = f" and {len(names) - most} more" if len(names) > most else ""
+    return ", ".join(map(str, names[:most])) + more
 
 
 def _short(value: object, limit: int = 80) -> str:

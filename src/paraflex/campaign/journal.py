@@ -157,7 +157,8 @@ class Journal:
         if self._waiting:
             # If a run has two rows, the later one is kept.
             waiting = {(int(row["run"]), row["id"]): row for row in self._waiting}
-            contents = {key: json.dumps(row, default=_plain) for key, row in waiting.items()}
+            # NumPy's numbers become Python's.
+            contents = {key: json.dumps(row, default=lambda number: number.item()) for key, row in waiting.items()}
             with uninterrupted(), self._connection:
                 self._write([(*key, content, _digest(*key, content)) for key, content in contents.items()])
             # The list is cleared after the transaction, so that rows of an interrupted commit are written at the end.
@@ -355,8 +356,3 @@ def _row(content: str) -> Row:
         if isinstance(found, dict) and isinstance(found.get("run"), int) and isinstance(found.get("id"), str):
             return found
     raise sqlite3.DatabaseError("a row does not describe a run")
-
-
-def _plain(number: Any) -> int | float:
-    """Convert a NumPy number to a Python number."""
-    return number.item()

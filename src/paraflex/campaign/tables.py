@@ -55,7 +55,7 @@ def write_table(folder: Path, journal: Journal, *, finished: bool) -> Path:
 
     file = folder / table_name(finished=finished)
     schema, held = _schema(journal), min(_HELD, _GROUP)
-    pieces = _pieces(journal, held)
+    pieces = (piece for _, piece in _batches(journal, held))
     with open_parquet(file, schema, remedy=GO_ON) as writer:
         while group := list(islice(pieces, _GROUP // held)):
             with uninterrupted():
@@ -140,7 +140,7 @@ def _journal_table(file: Path) -> pa.Table:
     import pyarrow as pa
 
     with read_journal(file) as journal:
-        return pa.concat_tables([_schema(journal).empty_table(), *_pieces(journal, _HELD)])
+        return pa.concat_tables([_schema(journal).empty_table(), *(piece for _, piece in _batches(journal, _HELD))])
 
 
 def read_data(file: Path) -> xr.Dataset:
@@ -189,10 +189,6 @@ def _schema(journal: Journal) -> pa.Schema:
 def checked_rows(journal: Journal) -> Iterator[Row]:
     """Yield all rows of a journal; raise `sqlite3.DatabaseError` if one has not the types of its columns."""
     return (row for rows, _ in _batches(journal, _HELD) for row in rows)
-
-
-def _pieces(journal: Journal, size: int) -> Iterator[pa.Table]:
-    return (piece for _, piece in _batches(journal, size))
 
 
 def _batches(journal: Journal, size: int) -> Iterator[tuple[list[Row], pa.Table]]:

@@ -7,9 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import partial
-from typing import Any
 
-from rich.console import Console
 from rich.progress import TimeElapsedColumn
 
 from paraflex.campaign import OnProgress, Progress
@@ -17,22 +15,12 @@ from paraflex.checks import check_planned
 from paraflex.cli.bars import bars
 from paraflex.cli.collected import apart, collected
 from paraflex.cli.commands.runs import RunRequest
-from paraflex.cli.ending import exit_code, print_results
-from paraflex.cli.integration import check_stops, model_parameters
-from paraflex.cli.reduced_bodies import kept_coordinates, reduced_as_requested
+from paraflex.cli.ending import exit_code, print_results, where, write_drawn, write_numbers
+from paraflex.cli.integration import kept_coordinates, reduced_as_requested, run_parameters
 from paraflex.cli.request import acting_controllers, command_provenance, controller_arguments, located_error, plan_study
-from paraflex.cli.tables import (
-    below_tolerance,
-    failures,
-    loads,
-    plain_console,
-    print_studies,
-    reductions,
-    stresses,
-    validity,
-    warn_of,
-)
-from paraflex.cli.writing import write_drawn_run, write_numbers
+from paraflex.cli.run_lines import failures, print_runs
+from paraflex.cli.stops import check_stops
+from paraflex.cli.tables import PlainConsole, warn_of
 from paraflex.compilation import compile_kernels
 from paraflex.control import ControllerDescription, simulate_controlled
 from paraflex.elastodynamics import simulate_ked
@@ -67,13 +55,9 @@ def run_along(
     paths: Mapping[str, tuple[Path, ResultsFolder]],
     modes: list[ActuationMode],
     options: IntegrationOptions,
-    how: dict[str, Any],
 ) -> int:
-    """Run along paths and write results into the folders held for them; return the exit code.
-
-    The integration settings `how` are stored with the results.
-    """
-    console = plain_console(stderr=True)
+    """Run along paths and write results into the folders held for them; return the exit code."""
+    console = PlainConsole(stderr=True)
     if request.segments is None:
         check_stops(mechanism, options, request.stop_at)
     controllers = acting_controllers(model, request)
@@ -86,7 +70,17 @@ def run_along(
         task, full = requested_tasks(request, model, mechanism, (path, name), modes)
         if request.segments is not None:
             check_stops(task.mechanism, options, request.stop_at)
-        parameters = _parameters(model, name, modes, task, how, request, controllers)
+        run = {
+            "path": name,
+            "modes": [mode.name for mode in modes],
+            "duration": float(task.motion.t[-1]),
+            "samples": int(task.motion.t.size),
+            "after": task.after.value,
+            "error": model.study.error,
+            "controllers": controller_arguments(model, controllers),
+        }
+        kept = kept_coordinates(request, model.study)
+        parameters = command_provenance(model, run | run_parameters(request, task.mechanism, options, kept))
         findings = check_planned(model, task, name, modes, request.plan.assembly)
         method, error = own_method(request, options, controllers), model.study.error
         study = TrackingStudy(
@@ -115,10 +109,11 @@ def _run(request: RunRequest, model: Model, planned: Sequence[_Along], fidelity:
 
     If a later path fails, the results of earlier ones are kept and printed.
     """
-    console, alone, done, places = plain_console(stderr=True), len(planned) == 1, {}, []
+    console, alone, done, places = PlainConsole(stderr=True), len(planned) == 1, {}, []
 
-    def show(out: Console) -> None:
-        _show(out, {"" if alone else path: result for path, result in done.items()}, planned[0].study.task, fidelity)
+    def show(out: PlainConsole) -> None:
+        results = {"" if alone else path: result for path, result in done.items()}
+        print_runs(out, results, planned[0].study.task, fidelity)
 
     try:
         for along in planned:
@@ -128,7 +123,7 @@ def _run(request: RunRequest, model: Model, planned: Sequence[_Along], fidelity:
                     if alone:
                         print_results(result.to_dict(), show, as_json=request.json)
                     else:
-                        warn_of(plain_console(stderr=request.json), verdict_of(result.data), along.whose)
+                        warn_of(PlainConsole(stderr=request.json), verdict_of(result.data), along.whose)
                     places.append(_draw(console, request, along, result, began))
             if result.interrupted:
                 break
@@ -137,32 +132,12 @@ def _run(request: RunRequest, model: Model, planned: Sequence[_Along], fidelity:
         if done and not alone:
             numbers = {"paths": {path: result.to_dict() for path, result in done.items()}}
             print_results(numbers, show, as_json=request.json, findings=())
-        for place in [] if request.json else places:
-            console.print(place, soft_wrap=True)
+        console.print_lines(*[] if request.json else places)
     well = len(done) == len(planned) and all(result.complete for result in done.values())
     return exit_code(well, interrupted=any(result.interrupted for result in done.values()))
 
 
-def _show(out: Console, results: Mapping[str, StudyResult], task: TrackingTask, fidelity: str) -> None:
-    """Print tables of the paths with results, and lines on all of these runs; the name of a single path is empty."""
-    ran = {path: result.to_dict() for path, result in results.items() if result.data is not None}
-    if not ran:
-        return
-    print_studies(out, results, ran, task, fidelity)
-    modes = {
-        f"{mode}, path {path}" if path else mode: one
-        for path, summary in ran.items()
-        for mode, one in summary["modes"].items()
-    }
-    reductions(out, ran)
-    below_tolerance(out, ran, modes)
-    validity(out, {name: mode.get("validity") for name, mode in modes.items()})
-    if len(results) > 1:
-        stresses(out, ran)
-    loads(out, {name: mode.get("loads", {}) for name, mode in modes.items()})
-
-
-def _simulated(console: Console, model: Model, along: _Along) -> StudyResult:
+def _simulated(console: PlainConsole, model: Model, along: _Along) -> StudyResult:
     """Run all modes along a path and write their results; nothing is written if no mode could start."""
     try:
         with _progress(console, along) as report:
@@ -179,11 +154,12 @@ def _simulated(console: Console, model: Model, along: _Along) -> StudyResult:
     return result
 
 
-def _draw(console: Console, request: RunRequest, along: _Along, result: StudyResult, began: float) -> str:
+def _draw(console: PlainConsole, request: RunRequest, along: _Along, result: StudyResult, began: float) -> str:
     """Add figures and report to the numbers, and print which modes failed; return a line with time and folder."""
     assert result.data is not None
     try:
-        return write_drawn_run(result.data, along.folder, request, began)
+        write_drawn(result.data, along.folder, request.drawn)
+        return where(began, "results", along.folder.path, request.drawn)
     finally:
         failures(console, result, along.whose)
 
@@ -213,30 +189,8 @@ def _model_name(request: RunRequest, mechanism: Mechanism) -> str:
     return f"{mechanism.geometry.value} geometry" if request.segments is None else "finite segments"
 
 
-def _parameters(
-    model: Model,
-    path: str,
-    modes: list[ActuationMode],
-    task: TrackingTask,
-    how: dict,
-    request: RunRequest,
-    controllers: Sequence[ControllerDescription],
-) -> dict:
-    run = {
-        "path": path,
-        "modes": [mode.name for mode in modes],
-        "duration": float(task.motion.t[-1]),
-        "samples": int(task.motion.t.size),
-        "after": task.after.value,
-        "error": model.study.error,
-        "controllers": controller_arguments(model, controllers),
-    }
-    kept = kept_coordinates(request, model.study)
-    return command_provenance(model, run | model_parameters(request, task.mechanism, kept) | how)
-
-
 @contextmanager
-def _progress(console: Console, along: _Along) -> Iterator[OnProgress]:
+def _progress(console: PlainConsole, along: _Along) -> Iterator[OnProgress]:
     """Show a progress bar for each mode; yield the callback that updates them."""
     task = along.study.task
     end = float(task.motion.t[-1])

@@ -3,23 +3,17 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING
 
-from rich.console import Console
 from rich.progress import TaskProgressColumn, TimeRemainingColumn
 
 from paraflex.cli import COMPLETE, signals
-from paraflex.cli.bars import bars, stopped_at_end
+from paraflex.cli.bars import late_bar
 from paraflex.cli.commands.results import AnimateRequest
 from paraflex.cli.replacing import refuse_existing
-from paraflex.cli.tables import plain_console
+from paraflex.cli.tables import PlainConsole
 from paraflex.errors import InputError
 from paraflex.results import open_results
-
-if TYPE_CHECKING:
-    from paraflex.plots.film import Film
 
 # Fields of `FilmOptions` that are passed on unchanged.
 _OPTIONS = ("magnify", "fps", "speed", "theme", "at", "model", "point")
@@ -33,11 +27,15 @@ def animate_command(request: AnimateRequest) -> int:
     refuse_existing(output, request.force)
     from paraflex.plots.film import FilmOptions, animate
 
-    console = plain_console(stderr=True)
+    console = PlainConsole(stderr=True)
     try:
         size = None if request.size is None else _size(request.size)
         options = FilmOptions(size=size, **{name: getattr(request, name) for name in _OPTIONS})
-        film = _drawn(console, lambda report: animate(data, output, request.modes, options, on_progress=report))
+        with late_bar(console, "pictures", None, TaskProgressColumn(), TimeRemainingColumn()) as update:
+            film = animate(
+                data, output, request.modes, options,
+                on_progress=lambda done, total: update(completed=done, total=total),
+            )  # fmt: skip
     except KeyboardInterrupt:
         console.print("interrupted: nothing was written")
         return signals.exit_code()
@@ -48,25 +46,11 @@ def animate_command(request: AnimateRequest) -> int:
         console.print(f"{width} x {height} pixels in {output}")
     else:
         duration = float(film.time[-1] - film.time[0]) / film.speed
-        console.print(
+        console.print_lines(
             f"{len(film.time)} pictures, {duration:.3g} s at {film.speed:g} of the speed, {width} x {height} pixels in "
-            f"{output}",
-            soft_wrap=True,
+            f"{output}"
         )
     return COMPLETE
-
-
-def _drawn(console: Console, draw: Callable[[Callable[[int, int], None]], Film]) -> Film:
-    """Draw the film with a progress bar."""
-    progress = bars(console, TaskProgressColumn(), TimeRemainingColumn())
-    bar = progress.add_task("pictures", total=None)
-
-    def report(done: int, total: int) -> None:
-        progress.start()
-        progress.update(bar, completed=done, total=total)
-
-    with stopped_at_end(progress):
-        return draw(report)
 
 
 def _size(text: str) -> tuple[int, int]:

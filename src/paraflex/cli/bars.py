@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from typing import Any
 
 from rich.console import Console
 from rich.progress import BarColumn, Progress, ProgressColumn, TextColumn, TimeElapsedColumn
@@ -29,13 +30,22 @@ def counting(console: Console) -> Iterator[OnProgress]:
 
 
 @contextmanager
-def stopped_at_end(progress: Progress) -> Iterator[None]:
-    """Stop progress bars at the end of the context, if they were started.
+def late_bar(
+    console: Console, description: str, total: float | None, *columns: ProgressColumn
+) -> Iterator[Callable[..., None]]:
+    """Provide a progress bar that appears at the first report, so that an error before it prints one line only.
 
-    The first report of progress starts them, so that an error before it prints one line only.
+    The function that is yielded updates the fields of the bar, such as `completed`.
     """
+    progress = bars(console, *columns)
+    bar = progress.add_task(description, total=total)
+
+    def update(**state: Any) -> None:
+        progress.start()
+        progress.update(bar, **state)
+
     try:
-        yield
+        yield update
     finally:
         if progress.live.is_started:
             progress.stop()

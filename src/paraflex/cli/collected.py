@@ -20,10 +20,8 @@ _printed: set[str] = set()
 @contextmanager
 def collecting() -> Iterator[None]:
     """Collect paraflex warnings and print them when the command ends; other warnings are shown as before."""
-    _found.clear()
-    _elsewhere.clear()
-    _others.clear()
-    _printed.clear()
+    for earlier in (_found, _elsewhere, _others, _printed):
+        earlier.clear()
     with warnings.catch_warnings():
         warnings.simplefilter("always", ParaflexWarning)
         before = warnings.showwarning

@@ -5,22 +5,19 @@ from __future__ import annotations
 import time
 from pathlib import Path
 
-from rich.console import Console
-
-from paraflex.cli import COMPLETE
 from paraflex.cli.commands.requests import flagged
 from paraflex.cli.commands.results import CompareRequest
 from paraflex.cli.ending import print_location, print_results
 from paraflex.cli.replacing import hold_results
-from paraflex.cli.tables import print_table
+from paraflex.cli.tables import PlainConsole, print_table
 from paraflex.figures.comparison import motion_table, number_table, setting_table
 from paraflex.folders import RUN_COMPARISON
 from paraflex.results.comparison import RunComparison, compare
 from paraflex.writing import write_json
 
 
-def compare_command(request: CompareRequest) -> int:
-    """Compare two runs, print the differences and, with --out, write them to files; return the exit code."""
+def compare_command(request: CompareRequest) -> None:
+    """Compare two runs, print the differences and, with --out, write them to files."""
     began = time.perf_counter()
     with flagged(request):
         found = compare(request.first, request.second, request.modes)
@@ -34,16 +31,14 @@ def compare_command(request: CompareRequest) -> int:
             with folder.added_files() as new:
                 save_overlays(found, new / "figures")
     print_results(found.to_dict(), lambda out: print_compared(out, found), as_json=request.json, findings=())
-    if request.out is not None and not request.json:
-        print_location(began, "numbers and figures", Path(request.out))
-    return COMPLETE
+    if request.out is not None:
+        print_location(began, "numbers and figures", Path(request.out), as_json=request.json)
 
 
-def print_compared(console: Console, found: RunComparison) -> None:
+def print_compared(console: PlainConsole, found: RunComparison) -> None:
     """Print the differences: settings, then the numbers and motions of each mode."""
-    console.print(f"first: {found.names[0]}\nsecond: {found.names[1]}", soft_wrap=True)
-    for note in found.notes:
-        console.print(note, soft_wrap=True)
+    console.print_lines(f"first: {found.names[0]}\nsecond: {found.names[1]}")
+    console.print_lines(*found.notes)
     if found.settings:
         print_table(console, setting_table(found))
     else:
@@ -57,5 +52,5 @@ def print_compared(console: Console, found: RunComparison) -> None:
             title = f"Numbers that differ{whose}" + (f" ({alike} others are the same)" if alike else "")
             print_table(console, number_table(differing, title))
         else:
-            console.print(f"All {alike} numbers are the same{whose}", soft_wrap=True)
+            console.print_lines(f"All {alike} numbers are the same{whose}")
         print_table(console, motion_table(found, mode, f"Motions{whose}: largest difference"))

@@ -3,22 +3,23 @@
 from __future__ import annotations
 
 import time
+from typing import Any
 
 from paraflex.cli.bars import counting
 from paraflex.cli.commands.requests import flagged
 from paraflex.cli.commands.runs import CompareMethodsRequest
-from paraflex.cli.compare_methods_tables import print_comparison
-from paraflex.cli.ending import exit_code, print_location, print_results
+from paraflex.cli.ending import exit_code, print_location, print_results, write_drawn
 from paraflex.cli.motion import own_motion, start_of
 from paraflex.cli.replacing import hold_results
 from paraflex.cli.request import command_provenance, find_mode, find_path, locating_errors, plan_study, requested_model
-from paraflex.cli.tables import plain_console
-from paraflex.cli.writing import write_drawn
+from paraflex.cli.tables import PlainConsole, print_table
 from paraflex.compilation import compile_kernels_for
 from paraflex.dynamics import build_system, consistent_state
 from paraflex.errors import InputError, renamed
+from paraflex.figures.methods import tables
 from paraflex.files import Model
-from paraflex.folders import COMPARISON, ResultsFolder
+from paraflex.folders import COMPARISON
+from paraflex.formatting import number
 from paraflex.integrators import METHODS
 from paraflex.integrators.methods import find_method
 from paraflex.mechanism import standing
@@ -36,41 +37,28 @@ def compare_methods_command(request: CompareMethodsRequest) -> int:
     # All checks that need no computation come before the long runs.
     mode = _mode(model, request)
     with hold_results(request.out, COMPARISON, force=request.force) as folder:
-        return _compare(request, model, mode, methods, options, folder)
-
-
-def _compare(
-    request: CompareMethodsRequest,
-    model: Model,
-    mode: str | None,
-    methods: list[str],
-    options: ComparisonOptions,
-    folder: ResultsFolder,
-) -> int:
-    """Run all methods in a mode, None without a path; write results into the held folder and return the exit code."""
-    console = plain_console(stderr=True)
-    compile_kernels_for(model.mechanism, console.print)
-    began = time.perf_counter()
-    if mode is None:
-        case = _motion(model, request)
-    else:
-        path, name = find_path(model, request.path)
-        case = tracking_case(plan_study(model, model.mechanism, path, name, request.plan), mode)
-    requested = {"limit": options.limit, "repetitions": options.repetitions}
-    requested |= {"tolerances": list(options.tolerances), "steps": list(options.steps), "case": case.name}
-    study = ComparisonStudy(case, methods, options, command_provenance(model, requested))
-    with counting(console) as report:
-        comparison = study.run(on_progress=report)
-    summary = comparison.to_dict()
-    if comparison.measurements:
-        comparison.save_in(folder)
-    print_results(summary, lambda out: print_comparison(out, summary), as_json=request.json, findings=())
-    if comparison.measurements:
-        write_drawn(summary, folder)
-        if not request.json:
-            print_location(began, "numbers and figure", folder.path)
-    done = any(run.status == "complete" for run in comparison.measurements)
-    return exit_code(done, interrupted=comparison.interrupted)
+        console = PlainConsole(stderr=True)
+        compile_kernels_for(model.mechanism, console.print)
+        began = time.perf_counter()
+        if mode is None:
+            case = _motion(model, request)
+        else:
+            path, name = find_path(model, request.path)
+            case = tracking_case(plan_study(model, model.mechanism, path, name, request.plan), mode)
+        requested = {"limit": options.limit, "repetitions": options.repetitions}
+        requested |= {"tolerances": list(options.tolerances), "steps": list(options.steps), "case": case.name}
+        study = ComparisonStudy(case, methods, options, command_provenance(model, requested))
+        with counting(console) as report:
+            comparison = study.run(on_progress=report)
+        summary = comparison.to_dict()
+        if comparison.measurements:
+            comparison.save_in(folder)
+        print_results(summary, lambda out: print_comparison(out, summary), as_json=request.json, findings=())
+        if comparison.measurements:
+            write_drawn(summary, folder)
+            print_location(began, "numbers and figure", folder.path, as_json=request.json)
+        done = any(run.status == "complete" for run in comparison.measurements)
+        return exit_code(done, interrupted=comparison.interrupted)
 
 
 def _options(request: CompareMethodsRequest) -> ComparisonOptions:
@@ -106,3 +94,38 @@ def _motion(model: Model, request: CompareMethodsRequest) -> Case:
         if start is None:
             start = consistent_state(build_system(mechanism), mechanism.assembly(study.assembly))
         return motion_case(mechanism, study.duration, samples=study.samples, torques=study.torques, start=start)
+
+
+def print_comparison(console: PlainConsole, summary: dict[str, Any]) -> None:
+    """Print errors and work of every run, time of every method to reach an error, failures, and the fastest method."""
+    reference = summary["reference"]
+    if reference is None:
+        return
+    console.print_lines(
+        f"{summary['mechanism']}, {summary['case']}, {number(summary['duration'])} s. Errors are distances from "
+        f"{reference['method']} at {number(reference['tolerance'])} m, known to "
+        f"{number(reference['uncertainty'], 1)} m (the distance of {reference['check_method']} at "
+        f"{number(reference['check_tolerance'])} m)."
+    )
+    for table in tables(summary):
+        print_table(console, table)
+    _print_reasons(console, summary["methods"])
+    fastest = [f"{level} m {name}" for level, name in summary["fastest"].items() if name is not None]
+    if fastest:
+        console.print_lines(f"Fastest: {', '.join(fastest)}")
+
+
+def _print_reasons(console: PlainConsole, methods: dict[str, Any]) -> None:
+    for name, method in methods.items():
+        for run in method["runs"]:
+            where = f" at {_setting(run)}" if _setting(run) else ""
+            if run["status"] != "complete":
+                console.print_lines(f"{name}{where}: {run['status']}, {run['reason']}")
+            for text in run["warnings"]:
+                console.print_lines(f"{name}{where}: warning: {text}")
+
+
+def _setting(run: dict[str, Any]) -> str:
+    if run["step"] is not None:
+        return f"{number(run['step'])} s"
+    return "" if run["tolerance"] is None else f"{number(run['tolerance'])} m"

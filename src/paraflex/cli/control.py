@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Iterator
+
+import xarray as xr
 
 from paraflex.campaign import Workers
 from paraflex.checks import check_planned
 from paraflex.cli.bars import counting
 from paraflex.cli.collected import collected
-from paraflex.cli.commands.control import CompareLawsRequest
 from paraflex.cli.commands.requests import flagged
-from paraflex.cli.control_tables import print_laws
-from paraflex.cli.ending import exit_code, print_location, print_results
+from paraflex.cli.commands.runs import CompareLawsRequest
+from paraflex.cli.ending import exit_code, print_location, print_results, write_drawn
 from paraflex.cli.replacing import hold_results
 from paraflex.cli.request import (
     command_provenance,
@@ -21,15 +23,17 @@ from paraflex.cli.request import (
     plan_study,
     requested_model,
 )
-from paraflex.cli.tables import plain_console
-from paraflex.cli.writing import write_drawn
+from paraflex.cli.tables import PlainConsole, print_table
 from paraflex.compilation import compile_kernels_for
 from paraflex.control import ControllerDescription
+from paraflex.figures.laws import law_table
 from paraflex.files import Model
-from paraflex.folders import LAW_COMPARISON, ResultsFolder
+from paraflex.folders import LAW_COMPARISON
 from paraflex.kinematics import Path
 from paraflex.mechanism import ActuationMode
 from paraflex.results.following import ErrorSpan
+from paraflex.results.metrics import VALIDITY
+from paraflex.studies.law_comparison import LawComparison
 from paraflex.studies.laws import LawStudy, laws_of, reduced_tasks
 
 Laws = dict[str, tuple[ControllerDescription, ...]]
@@ -44,31 +48,23 @@ def compare_laws_command(request: CompareLawsRequest) -> int:
     paths, modes = find_paths(model, request.paths), find_modes(model, request.modes)
     # All checks that need no computation come before the long runs.
     with hold_results(request.out, LAW_COMPARISON, force=request.force, field="--output") as folder:
-        return _compare(request, model, laws, paths, modes, folder)
-
-
-def _compare(
-    request: CompareLawsRequest, model: Model, laws: Laws, paths: Paths, modes: list[ActuationMode],
-    folder: ResultsFolder,
-) -> int:  # fmt: skip
-    console = plain_console(stderr=True)
-    compile_kernels_for(model.mechanism, console.print)
-    began = time.perf_counter()
-    study = _study(request, model, laws, paths, modes)
-    with counting(console) as report:
-        result = study.run(workers=Workers(number=request.workers), on_progress=report)
-    if not result.begun:
-        console.print("interrupted before any law had run; nothing is written", soft_wrap=True)
-        return exit_code(False, interrupted=result.interrupted)
-    result.save_in(folder)
-    findings = collected(
-        check_planned(model, next(iter(study.tasks.values())), next(iter(paths)), modes, request.plan.assembly)
-    )
-    print_results(result.to_dict(), lambda out: print_laws(out, result), as_json=request.json, findings=findings)
-    write_drawn(result.data, folder)
-    if not request.json:
-        print_location(began, "table and figure", folder.path)
-    return exit_code(bool((result.data["status"] == "complete").any()), interrupted=result.interrupted)
+        console = PlainConsole(stderr=True)
+        compile_kernels_for(model.mechanism, console.print)
+        began = time.perf_counter()
+        study = _study(request, model, laws, paths, modes)
+        with counting(console) as report:
+            result = study.run(workers=Workers(number=request.workers), on_progress=report)
+        if not result.begun:
+            console.print_lines("interrupted before any law had run; nothing is written")
+            return exit_code(False, interrupted=result.interrupted)
+        result.save_in(folder)
+        findings = collected(
+            check_planned(model, next(iter(study.tasks.values())), next(iter(paths)), modes, request.plan.assembly)
+        )
+        print_results(result.to_dict(), lambda out: print_laws(out, result), as_json=request.json, findings=findings)
+        write_drawn(result.data, folder)
+        print_location(began, "table and figure", folder.path, as_json=request.json)
+        return exit_code(bool((result.data["status"] == "complete").any()), interrupted=result.interrupted)
 
 
 def _study(request: CompareLawsRequest, model: Model, laws: Laws, paths: Paths, modes: list[ActuationMode]) -> LawStudy:
@@ -87,3 +83,33 @@ def _study(request: CompareLawsRequest, model: Model, laws: Laws, paths: Paths, 
             reduced_tasks(model, tasks, modes), laws, modes, options, request.metrics, ErrorSpan(model.study.error),
             command_provenance(model, requested | options.to_dict()),
         )  # fmt: skip
+
+
+def print_laws(console: PlainConsole, result: LawComparison) -> None:
+    """Print a row for each law in each mode, and reasons of those that failed or are doubtful."""
+    print_table(console, law_table(result.data))
+    console.print_lines(*_reasons(result), *_doubtful(result))
+    if result.interrupted:
+        console.print_lines("interrupted before all laws had run: the same command starts over")
+
+
+def _reasons(result: LawComparison) -> Iterator[str]:
+    """Yield the reasons why laws failed or are doubtful in a mode; cases with the same reason share a line."""
+    alike = dict[tuple[str, str], list[str]]()
+    for name, cell in _cells(result):
+        if reason := str(cell["reason"].item()):
+            alike.setdefault((str(cell["status"].item()), reason), []).append(name)
+    for (status, reason), names in alike.items():
+        yield f"{'; '.join(names)}: {status}, {reason}"
+
+
+def _doubtful(result: LawComparison) -> Iterator[str]:
+    """Yield a line with the laws and modes that bend links beyond what the model can describe, if any."""
+    if names := [name for name, cell in _cells(result) if cell[VALIDITY] > 1.0]:
+        yield f"beyond what the model can describe ({VALIDITY} above 1): {'; '.join(names)}"
+
+
+def _cells(result: LawComparison) -> Iterator[tuple[str, xr.Dataset]]:
+    for law in result.laws:
+        for mode in result.modes:
+            yield f"{law} in {mode}", result.data.sel(law=law, mode=mode)

@@ -7,7 +7,7 @@ import re
 from pathlib import Path
 
 from paraflex.cli.commands.models import NewRequest, SchemaRequest
-from paraflex.cli.tables import plain_console
+from paraflex.cli.tables import PlainConsole
 from paraflex.errors import OutputError, renamed
 from paraflex.files import library_text, model_schema
 from paraflex.writing import write_text
@@ -23,9 +23,9 @@ def new_command(request: NewRequest) -> None:
         raise OutputError("already exists", field=str(path), remedy="choose another name, or remove it")
     text = re.sub(r'^name = ".*"$', lambda _: f"name = {json.dumps(path.stem)}", text, count=1, flags=re.MULTILINE)
     write_text(path, text, parents=False)
-    console = plain_console()
-    console.print(f"{path}: a copy of {template} to edit. Then", soft_wrap=True)
-    console.print(f"  paraflex info {path}\n  paraflex run {path}", soft_wrap=True)
+    console = PlainConsole()
+    console.print_lines(f"{path}: a copy of {template} to edit. Then")
+    console.print_lines(f"  paraflex info {path}\n  paraflex run {path}")
 
 
 def schema_command(_: SchemaRequest) -> None:

@@ -11,17 +11,15 @@ from io import StringIO
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from rich.console import Console
 from rich.table import Table
 
 from paraflex.checks.drawing import pose_of
-from paraflex.cli import COMPLETE
 from paraflex.cli.commands.models import DrawRequest
 from paraflex.cli.replacing import refuse_existing
 from paraflex.cli.request import requested_model
-from paraflex.cli.tables import few, framed_table, plain_console
+from paraflex.cli.tables import PlainConsole, framed_table
 from paraflex.equilibria.conditions import StaticsDefaults
-from paraflex.errors import InputError
+from paraflex.errors import InputError, listed
 from paraflex.files import Model
 from paraflex.mechanism import Mechanism
 from paraflex.results.acting import acting_load, drive_speed
@@ -33,6 +31,8 @@ if TYPE_CHECKING:
     from paraflex.results.posed import Posed
 
 FORMATS = (".html", ".svg", ".png", ".pdf")
+# Directions of a joint's coordinate that grows, and of one that falls.
+_SLIDING, _TURNING = ("along its axis", "against its axis"), ("anticlockwise", "clockwise")
 # Resolution of PNG [dots per inch], and largest number of rows of a table.
 _DPI, _LISTED = 200.0, 12
 _PAGE = """<!doctype html>
@@ -45,15 +45,13 @@ svg {{ width: 100%; height: auto; max-height: 92vh }} p.open {{ color: #c8102e }
 """
 
 
-def draw_command(request: DrawRequest) -> int:
-    """Draw the mechanism and print the name of the file; return the exit code."""
+def draw_command(request: DrawRequest) -> None:
+    """Draw the mechanism and print the name of the file."""
     output = None if request.output is None else Path(request.output)
     if output is not None:
         if output.suffix.lower() not in FORMATS:
-            raise InputError(
-                "unknown kind of drawing", field="--output", value=request.output,
-                remedy="end it in .html, .svg, .png or .pdf",
-            )  # fmt: skip
+            remedy = "end it in .html, .svg, .png or .pdf"
+            raise InputError("unknown kind of drawing", field="--output", value=request.output, remedy=remedy)
         refuse_existing(output, request.force)
     model = requested_model(request.model)
     shown = pose_of(model, assembly=request.assembly, path=request.path)
@@ -63,11 +61,10 @@ def draw_command(request: DrawRequest) -> int:
     from paraflex.plots.model_drawing import model_drawing
 
     _write(model_drawing(shown, theme_name=request.theme), shown, output)
-    _print_result(plain_console(), model, shown, request, output)
+    _print_result(PlainConsole(), model, shown, request, output)
     opens = (request.output is None and _has_screen()) if request.open is None else request.open
     if opens and not webbrowser.open(output.resolve().as_uri()):
-        plain_console(stderr=True).print("no browser opens it here", soft_wrap=True)
-    return COMPLETE
+        PlainConsole(stderr=True).print_lines("no browser opens it here")
 
 
 def _write(figure: Figure, shown: Posed, output: Path) -> None:
@@ -93,26 +90,26 @@ def _has_screen() -> bool:
     return screen and sys.stdout.isatty()
 
 
-def _print_result(console: Console, model: Model, shown: Posed, request: DrawRequest, output: Path) -> None:
+def _print_result(console: PlainConsole, model: Model, shown: Posed, request: DrawRequest, output: Path) -> None:
     """Print joints, bodies, drives, loads, sensors, open joints, the name of the drawing and the next commands."""
     mechanism = model.mechanism
-    console.print(f"{mechanism.name} ({model.source})", soft_wrap=True)
+    console.print_lines(f"{mechanism.name} ({model.source})")
     console.print(_joints(mechanism, shown))
-    console.print(f"bodies: {few([body.name for body in mechanism.bodies], _LISTED)}", soft_wrap=True)
-    for line in [*_drives(mechanism, shown), *_loads(mechanism, shown)]:
-        console.print(line, soft_wrap=True)
+    console.print_lines(f"bodies: {listed([body.name for body in mechanism.bodies], _LISTED)}")
+    console.print_lines(*_drives(mechanism, shown))
+    for load in mechanism.loads[:_LISTED]:
+        size = acting_load(load, shown.duration).size
+        console.print_lines(f"load {load.name}: {load.kind} at {load.point}, {size}")
     if mechanism.sensors:
         sensors = [f"{one.name} ({one.kind})" for one in mechanism.sensors]
-        console.print(f"sensors: {few(sensors, _LISTED)}", soft_wrap=True)
-    for problem in shown.problems:
-        console.print(f"warning: {problem}", soft_wrap=True)
+        console.print_lines(f"sensors: {listed(sensors, _LISTED)}")
+    console.print_lines(*(f"warning: {problem}" for problem in shown.problems))
     if shown.gaps:
-        listed = ", ".join(f"{name} by {gap}" for name, gap in shown.gaps.items())
-        console.print(f"drawn as given, with open joints: {listed}", soft_wrap=True)
-    console.print(f"drawn in {output}", soft_wrap=True)
+        gaps = ", ".join(f"{name} by {gap}" for name, gap in shown.gaps.items())
+        console.print_lines(f"drawn as given, with open joints: {gaps}")
     name = request.model.name
     then = "run" if model.statics == StaticsDefaults() else "statics"
-    console.print(f"next: paraflex info {name}, paraflex {then} {name}", soft_wrap=True)
+    console.print_lines(f"drawn in {output}", f"next: paraflex info {name}, paraflex {then} {name}")
 
 
 def _drives(mechanism: Mechanism, shown: Posed) -> list[str]:
@@ -124,19 +121,11 @@ def _drives(mechanism: Mechanism, shown: Posed) -> list[str]:
         if not sign:
             lines.append(f"prescribed {drive.name}: {drive.joint} is held")
             continue
-        if joint.slides:
-            way = "along its axis" if sign > 0 else "against its axis"
-        else:
-            way = "anticlockwise" if sign > 0 else "clockwise"
+        forwards, backwards = _SLIDING if joint.slides else _TURNING
+        way = forwards if sign > 0 else backwards
         speed = drive_speed(drive, joint.slides, shown.duration)
         lines.append(f"prescribed {drive.name}: {joint.b.body} at {drive.joint} {way}, {speed}")
     return lines
-
-
-def _loads(mechanism: Mechanism, shown: Posed) -> list[str]:
-    """Return a line for each load with its magnitude."""
-    sizes = [acting_load(load, shown.duration) for load in mechanism.loads[:_LISTED]]
-    return [f"load {one.load.name}: {one.load.kind} at {one.load.point}, {one.size}" for one in sizes]
 
 
 def _joints(mechanism: Mechanism, shown: Posed) -> Table:

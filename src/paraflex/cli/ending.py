@@ -1,19 +1,29 @@
-"""End of a command: output of its results, and exit code."""
+"""Results of a command: printed, and written with figures and a report; and its exit code."""
 
 from __future__ import annotations
 
 import json
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
+from contextlib import nullcontext
 from pathlib import Path
 from typing import Any
 
-from rich.console import Console
+import xarray as xr
 
 from paraflex.cli import COMPLETE, FAILURE, signals
-from paraflex.cli.commands.options import DrawnChoice
-from paraflex.cli.tables import plain_console, warn_of
+from paraflex.cli.commands.options import DrawnChoice, FilesChoice
+from paraflex.cli.replacing import hold_results
+from paraflex.cli.tables import PlainConsole, warn_of
+from paraflex.errors import OutputError
 from paraflex.findings import Finding
+from paraflex.folders import RESULT_KINDS, ResultsFolder
+from paraflex.results import save_results
+from paraflex.results.kinds import kind_of
+from paraflex.writing import write_json
+
+_LATER = "paraflex plot and paraflex report draw them"
+_FIGURES = DrawnChoice(report=False)
 
 
 def exit_code(well: bool, *, interrupted: bool) -> int:
@@ -25,7 +35,7 @@ def exit_code(well: bool, *, interrupted: bool) -> int:
 
 def print_results(
     numbers: dict[str, Any],
-    show: Callable[[Console], None],
+    show: Callable[[PlainConsole], None],
     *,
     as_json: bool,
     findings: Iterable[Finding] | None = None,
@@ -43,19 +53,20 @@ def print_results(
     findings : iterable of Finding, optional
         Findings to print; by default those of the verdict in `numbers`.
     """
-    out = plain_console()
+    out = PlainConsole()
     if findings is None:
         findings = map(Finding.from_dict, numbers["verdict"]["findings"])
-    warn_of(plain_console(stderr=True) if as_json else out, findings)
+    warn_of(PlainConsole(stderr=True) if as_json else out, findings)
     if as_json:
         print(json.dumps(numbers, indent=2))
     else:
         show(out)
 
 
-def print_location(began: float, what: str, folder: Path, drawn: DrawnChoice | None = None) -> None:
-    """Print the last line of a command: elapsed time, and folder of the results."""
-    plain_console(stderr=True).print(where(began, what, folder, drawn), soft_wrap=True)
+def print_location(began: float, what: str, folder: Path, drawn: DrawnChoice | None = None, *, as_json: bool) -> None:
+    """Print the last line of a command, unless it prints JSON: elapsed time, and folder of the results."""
+    if not as_json:
+        PlainConsole(stderr=True).print_lines(where(began, what, folder, drawn))
 
 
 def where(began: float, what: str, folder: Path, drawn: DrawnChoice | None = None) -> str:
@@ -64,3 +75,69 @@ def where(began: float, what: str, folder: Path, drawn: DrawnChoice | None = Non
         what += ", figures" if drawn.figures else ""
         what += " and report.html" if drawn.report else ""
     return f"{time.perf_counter() - began:.1f} s; {what} in {folder}"
+
+
+def write_numbers(data: xr.Dataset, summary: dict[str, Any], folder: ResultsFolder) -> None:
+    """Write a dataset and its summary in place of earlier results."""
+    kind = RESULT_KINDS[kind_of(data)]
+    with folder.replaced() as new:
+        save_results(data, new / kind.data)
+        write_json(new / kind.files[0], summary)
+
+
+def write_drawn(results: xr.Dataset | Mapping[str, Any], folder: ResultsFolder, drawn: DrawnChoice = _FIGURES) -> None:
+    """Add figures, and the report of a dataset, to results already written, which an interruption leaves intact."""
+    try:
+        with folder.added_files() as new:
+            if drawn.figures:
+                from paraflex.plots import save_figures  # its import takes a second
+
+                save_figures(results, new / "figures")
+            if drawn.report and isinstance(results, xr.Dataset):
+                from paraflex.cli.report import page_of, save_page  # as does this one
+
+                save_page(page_of(results, folder.path), new / "report.html")
+    except KeyboardInterrupt as interrupt:
+        interrupt.args = (f"the numbers are in {folder.path}; {_LATER}",)
+        raise
+    except OutputError as error:
+        remedy = f"the numbers are in {folder.path}: once there is room, {_LATER}"
+        raise OutputError(error.problem, field=error.field, remedy=remedy) from error
+
+
+def give_dataset(
+    kind: str,
+    make: Callable[[], xr.Dataset],
+    summary: Callable[[xr.Dataset], dict[str, Any]],
+    show: Callable[[PlainConsole, xr.Dataset], None],
+    chosen: FilesChoice,
+    findings: Iterable[Finding] | None = None,
+) -> xr.Dataset:
+    """Make the dataset of a command, print it and, if a folder is given, write it there; return it.
+
+    Parameters
+    ----------
+    kind : str
+        Kind of the dataset, one of `paraflex.folders.RESULT_KINDS`.
+    make : callable
+        Function that makes the dataset, called when the folder is held.
+    summary : callable
+        Function that returns the dataset as plain numbers.
+    show : callable
+        Function that prints tables of the dataset to a console.
+    chosen : FilesChoice
+        Folder, and what is drawn and printed.
+    findings : iterable of Finding, optional
+        Findings printed before the tables; by default those of the summary's verdict.
+    """
+    began, place = time.perf_counter(), RESULT_KINDS[kind].folder
+    with nullcontext() if chosen.out is None else hold_results(chosen.out, place, force=chosen.force) as folder:
+        data = make()
+        numbers = summary(data)
+        print_results(numbers, lambda out: show(out, data), as_json=chosen.json, findings=findings)
+        if folder is not None:
+            write_numbers(data, numbers, folder)
+            write_drawn(data, folder, chosen.drawn)
+    if folder is not None:
+        print_location(began, "numbers", folder.path, chosen.drawn, as_json=chosen.json)
+    return data

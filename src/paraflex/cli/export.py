@@ -6,15 +6,15 @@ from pathlib import Path
 
 from paraflex.cli.commands.requests import flagged
 from paraflex.cli.commands.results import ExportRequest
-from paraflex.cli.tables import plain_console
+from paraflex.cli.tables import PlainConsole
 from paraflex.results import open_results
 from paraflex.results.export import export, export_table
 
 _TABLE = "results.parquet"
 
 
-def export_command(request: ExportRequest) -> int:
-    """Write the files; return the exit code."""
+def export_command(request: ExportRequest) -> None:
+    """Write the files."""
     results = Path(request.results)
     folder = results if results.is_dir() else results.parent
     output = folder / "export" if request.output is None else Path(request.output)
@@ -25,7 +25,6 @@ def export_command(request: ExportRequest) -> int:
         else:
             data = open_results(results)
             files = export(data, output, request.to, shapes=request.shapes, force=request.force)
-    console = plain_console(stderr=True)
+    console = PlainConsole(stderr=True)
     for file in files:
-        console.print(f"{file} ({file.stat().st_size / 1e6:.3g} MB)", soft_wrap=True)
-    return 0
+        console.print_lines(f"{file} ({file.stat().st_size / 1e6:.3g} MB)")

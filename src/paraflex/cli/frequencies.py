@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from typing import Any
 
 import numpy as np
@@ -10,6 +9,7 @@ from numpy.typing import NDArray
 
 from paraflex.checks import BALANCED
 from paraflex.cli.commands.models import InfoRequest
+from paraflex.cli.request import check_time
 from paraflex.dynamics import (
     State,
     System,
@@ -65,8 +65,7 @@ def _has_equilibrium(system: System, state: State, held: list[str]) -> bool:
 
 def _pose_at(model: Model, rigid: System, start: State, assembly: str, at: float, path: str | None) -> State:
     """Return the pose of the rigid mechanism at the time `at` [s], on its path or by its prescribed angles."""
-    if not (math.isfinite(at) and at >= 0.0):
-        raise InputError("not a time of the motion", field="--at", value=at, remedy="give it in s, not negative")
+    check_time(at)
     if path is not None or model.paths:
         motion = follow_path(model.mechanism, model.path(path), [0.0, at] if at else [0.0], assembly=assembly)
         return State(at, motion.q[-1], np.zeros(rigid.n))

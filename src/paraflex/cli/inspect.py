@@ -194,9 +194,10 @@ def _links(mechanism: Mechanism, system: System) -> list[dict[str, Any]]:
 
 
 def _start_facts(start: Closure) -> dict[str, Any]:
-    numbers = {name: _number(getattr(start, name)) for name in ("gap_before", "position", "velocity", "gap")}
+    numbers = {name: getattr(start, name) for name in ("gap_before", "position", "velocity", "gap")}
+    finite = {name: value if math.isfinite(value) else None for name, value in numbers.items()}
     return {
-        "assembly": start.assembly, "closes": start.closes, **numbers, "where": list(start.where),
+        "assembly": start.assembly, "closes": start.closes, **finite, "where": list(start.where),
         "problem": start.problem,
     }  # fmt: skip
 
@@ -221,7 +222,3 @@ def _reach_facts(drives: DrivenFreedoms) -> dict[str, Any]:
         "minimal_sets": [list(motors) for motors in drives.sets],
         "more_sets": drives.more,
     }
-
-
-def _number(value: float) -> float | None:
-    return value if math.isfinite(value) else None

@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
-from rich.console import Console
 from rich.padding import Padding
 from rich.table import Table
 
-from paraflex.cli.tables import few, framed_table, plain_console
+from paraflex.cli.tables import PlainConsole, framed_table
+from paraflex.errors import listed
 from paraflex.files import generator_names
 from paraflex.findings import Level
 from paraflex.mechanism import Mechanism, groups_of
@@ -20,14 +20,14 @@ _LISTED = 12
 
 def print_library(facts: Sequence[dict[str, Any]]) -> None:
     """Print the mechanisms of the library: a line of facts and a description of each."""
-    console = plain_console()
+    console = PlainConsole()
     for one in facts:
         freedoms = "" if one["degrees_of_freedom"] is None else f"freedoms {one['degrees_of_freedom']}, "
         motors = f"motors {len(one['motors'])}"
         runs = f"along {', '.join(one['paths'])}" if one["paths"] else "on its own"
         if not one["paths"] and one["duration"] is not None:
             runs += f" for {one['duration']:g} s"
-        console.print(f"{one['name']}: {freedoms}bodies {one['bodies']}, {motors}; runs {runs}", soft_wrap=True)
+        console.print_lines(f"{one['name']}: {freedoms}bodies {one['bodies']}, {motors}; runs {runs}")
         console.print(Padding(one["description"], (0, 0, 0, 4)))
     console.print(f"and of any size, with a number after the name: {', '.join(generator_names())}")
     console.print("paraflex info NAME describes one; paraflex new FILE --from NAME copies one to edit")
@@ -35,15 +35,15 @@ def print_library(facts: Sequence[dict[str, Any]]) -> None:
 
 def print_facts(facts: dict[str, Any]) -> None:
     """Print a mechanism: counts, loops, redundancies, assemblies, motors, links, frequencies, verdict."""
-    console = plain_console()
+    console = PlainConsole()
     console.print(f"{facts['name']} ({facts['source']})")
     if facts["description"]:
         console.print(facts["description"])
     console.print(_counts(facts))
-    loops = [f"loop {k + 1}: {few(loop, _LISTED)}" for k, loop in enumerate(facts["loops"])]
+    loops = [f"loop {k + 1}: {listed(loop, _LISTED)}" for k, loop in enumerate(facts["loops"])]
     _print_some(console, loops, facts["loop_count"], " loops")
     redundancies = [
-        f"redundant: {one['row']}, among {few(one['among'], _LISTED)}" for one in facts.get("redundancies", [])
+        f"redundant: {one['row']}, among {listed(one['among'], _LISTED)}" for one in facts.get("redundancies", [])
     ]
     _print_some(console, redundancies, len(redundancies))
     _print_starts(console, facts)
@@ -55,16 +55,16 @@ def print_facts(facts: dict[str, Any]) -> None:
     print_verdict(console, facts)
 
 
-def print_verdict(console: Console, facts: dict[str, Any]) -> None:
+def print_verdict(console: PlainConsole, facts: dict[str, Any]) -> None:
     """Print each finding on a line, then the verdict: sound, doubtful or wrong."""
     verdict = facts["verdict"]
     for one in verdict["findings"]:
-        console.print(f"{one['level']}: {one['place']}: {one['text']}; {one['remedy']} [{one['code']}]", soft_wrap=True)
+        console.print_lines(f"{one['level']}: {one['place']}: {one['text']}; {one['remedy']} [{one['code']}]")
     if verdict["level"] == Level.SOUND.value:
         drives = ", every mode drives all degrees of freedom" if facts["modes"] else ""
         paths = "paths" if facts["several_paths"] else "path"
         path = f", the study's {paths} can be followed" if facts["paths"] else ""
-        console.print(f"sound: every assembly closes, the pose is not a special one{drives}{path}", soft_wrap=True)
+        console.print_lines(f"sound: every assembly closes, the pose is not a special one{drives}{path}")
     else:
         count = len(verdict["findings"])
         console.print(f"verdict: {verdict['level']}, for {count} reason{'s' if count > 1 else ''}")
@@ -102,7 +102,7 @@ def _counts(facts: dict[str, Any]) -> Table:
                 table.add_row(label, f"{value:g}, including its payload")
                 table.add_row("payload", _payload(facts["payload"]))
                 continue
-            table.add_row(label, (few(value, _LISTED) or "none") if isinstance(value, list) else f"{value:g}")
+            table.add_row(label, (listed(value, _LISTED) or "none") if isinstance(value, list) else f"{value:g}")
     return table
 
 
@@ -114,26 +114,25 @@ def _payload(carried: dict[str, Any]) -> str:
     return f"{carried['mass']:g} kg{inertia} at {carried['point']}{beside}"
 
 
-def _print_some(console: Console, lines: Sequence[str], count: int, what: str = "") -> None:
+def _print_some(console: PlainConsole, lines: Sequence[str], count: int, what: str = "") -> None:
     """Print the first lines, and the number of those left out."""
-    for line in lines[:_LISTED]:
-        console.print(line, soft_wrap=True)
+    console.print_lines(*lines[:_LISTED])
     if count > _LISTED:
         console.print(f"and {count - _LISTED} more{what}")
 
 
-def _print_starts(console: Console, facts: dict[str, Any]) -> None:
+def _print_starts(console: PlainConsole, facts: dict[str, Any]) -> None:
     headings = ("assembly", "gap of the given angles", "closed to [m, rad]", "rates to [1/s]", "remaining gap", "where")
     table = framed_table("assemblies, rigid", headings, right=(1, 2, 3, 4))
     for start in facts["starts"]:
         numbers = ["" if start[key] is None else f"{start[key]:.2g}" for key in ("gap_before", "position", "velocity")]
         gap = "none" if start["closes"] else (f"{start['gap']:.3g}" if start["gap"] else "")
-        table.add_row(start["assembly"], *numbers, gap, few(start["where"], _LISTED))
+        table.add_row(start["assembly"], *numbers, gap, listed(start["where"], _LISTED))
     if facts["starts"]:
         console.print(table)
 
 
-def _print_drives(console: Console, facts: dict[str, Any]) -> None:
+def _print_drives(console: PlainConsole, facts: dict[str, Any]) -> None:
     drives, freedoms = facts["drives"], facts["degrees_of_freedom"]
     if not facts["motors"] or not freedoms:
         return
@@ -141,7 +140,7 @@ def _print_drives(console: Console, facts: dict[str, Any]) -> None:
     sets = [" ".join(motors) for motors in drives["minimal_sets"]]
     if sets:
         more = " at least" if drives["more_sets"] else ""
-        console.print(f"sets of motors that suffice,{more} {len(sets)}: {few(sets, _LISTED)}", soft_wrap=True)
+        console.print_lines(f"sets of motors that suffice,{more} {len(sets)}: {listed(sets, _LISTED)}")
 
 
 def _links(facts: dict[str, Any]) -> Table:
@@ -159,7 +158,7 @@ def _links(facts: dict[str, Any]) -> Table:
     return table
 
 
-def _print_frequencies(console: Console, facts: dict[str, Any]) -> None:
+def _print_frequencies(console: PlainConsole, facts: dict[str, Any]) -> None:
     found, motors = facts["frequencies"], bool(facts["motors"])
     free = "motors free" if motors else "prescribed motions held" if facts["prescribed"] else "lowest"
     pose = "static equilibrium" if found["balanced"] else "undeformed"
@@ -167,7 +166,7 @@ def _print_frequencies(console: Console, facts: dict[str, Any]) -> None:
     for label, key in (("motors held", "motors_held_hz"), (free, "motors_free_hz")):
         if found[key] is not None:
             lowest = ", ".join(f"{f:.4g}" for f in found[key][:6])
-            console.print(f"  {label}: {lowest or 'none: nothing can move'}", soft_wrap=True)
+            console.print_lines(f"  {label}: {lowest or 'none: nothing can move'}")
     if found["growing"]:
         where = (
             "unstable there" if found["is_equilibrium"] else "the pose is not an equilibrium, so this may be its fall"
@@ -181,8 +180,7 @@ def _print_frequencies(console: Console, facts: dict[str, Any]) -> None:
             if motors
             else "there is none nearby"
         )
-        console.print(
+        console.print_lines(
             f"  not an equilibrium: when released it would start with {found['acceleration']:.3g} m/s^2, root mean "
-            f"square over the mass; {nearby}",
-            soft_wrap=True,
+            f"square over the mass; {nearby}"
         )

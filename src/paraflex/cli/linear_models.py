@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -14,6 +13,7 @@ from paraflex.cli.commands.models import LinearRequest
 from paraflex.cli.commands.options import PlanChoice
 from paraflex.cli.commands.requests import conflict, flagged
 from paraflex.cli.request import (
+    check_time,
     command_provenance,
     find_modes,
     find_path,
@@ -22,7 +22,7 @@ from paraflex.cli.request import (
     plan_study,
     requested_model,
 )
-from paraflex.cli.tables import plain_console
+from paraflex.cli.tables import PlainConsole
 from paraflex.compilation import compile_kernels_for
 from paraflex.dynamics import State, build_system, pose_at_rest, standing_system, undeformed
 from paraflex.errors import ActuationError, AssemblyError, InputError
@@ -48,7 +48,7 @@ class RequestedModels(NamedTuple):
     """Linear models, one for each mode, with the motions that they are about (none at rest) and their provenance."""
 
     models: list[LinearModel]
-    motions: list[Motion]
+    motions: Sequence[Motion]
     modes: list[ActuationMode]
     ports: dict[str, Any]
     parameters: dict[str, Any]
@@ -83,9 +83,9 @@ def _of_results(request: LinearRequest, command: str) -> Callable[[], RequestedM
     def models() -> RequestedModels:
         found = list(runs)
         modes = [run.mode if isinstance(run, TrackingRun) else _everything(model.mechanism) for run in found]
-        parameters = _parameters(model, modes, request, command)
-        parameters["run"]["results"] = request.model.name
-        return _moving(found, model, modes, request, parameters)
+        made = _models(model, modes, request, command, found)
+        made.parameters["run"]["results"] = request.model.name
+        return made
 
     return models
 
@@ -99,10 +99,8 @@ def _check(request: LinearRequest) -> None:
         for other, given in (("--pose", request.pose), ("--balanced", request.balanced or None)):
             if given is not None:
                 raise conflict(f"is about a motion, {other} about rest", flag, value)
-    if request.at is not None and not (math.isfinite(request.at) and request.at >= 0.0):
-        raise InputError(
-            "not a time of the motion", field="--at", value=request.at, remedy="give it in s, not negative"
-        )
+    if request.at is not None:
+        check_time(request.at)
     if request.along is not None and not 2 <= request.along <= _MOST_MOMENTS:
         raise InputError(
             "not a valid number of times",
@@ -135,36 +133,26 @@ def _everything(mechanism: Mechanism) -> ActuationMode:
     return ActuationMode("all motors" if motors else "no motors", motors)
 
 
-def _models(model: Model, modes: Sequence[ActuationMode], request: LinearRequest, command: str) -> RequestedModels:
-    """Return the linear models in all modes, at rest or about the planned motion."""
-    ports = _ports(request)
+def _models(
+    model: Model,
+    modes: list[ActuationMode],
+    request: LinearRequest,
+    command: str,
+    motions: Sequence[Motion] | None = None,
+) -> RequestedModels:
+    """Return the linear models in all modes: about the given motions, else at rest or about the planned motion."""
+    ports = {"forces": request.forces, "prescribed": request.prescribed, "coordinates": request.coordinates}
+    parameters = _parameters(model, modes, request, command)
     with flagged(request):
-        if request.at is None and request.along is None and request.path is None:
+        if motions is None and request.at is None and request.along is None and request.path is None:
             pose = requested_pose(model, request.pose, request.assembly, "--pose")
             models = [_at_rest(model, pose, mode, request.balanced, ports) for mode in modes]
-            return RequestedModels(models, [], list(modes), ports, _parameters(model, modes, request, command), model)
-        motion = _motion(model, request)
-        return _moving([motion] * len(modes), model, modes, request, _parameters(model, modes, request, command))
-
-
-def _ports(request: LinearRequest) -> dict[str, Any]:
-    """Return the arguments of `linearise` for inputs and first states."""
-    return {"forces": request.forces, "prescribed": request.prescribed, "coordinates": request.coordinates}
-
-
-def _moving(
-    motions: Sequence[Motion],
-    model: Model,
-    modes: Sequence[ActuationMode],
-    request: LinearRequest,
-    parameters: dict[str, Any],
-) -> RequestedModels:
-    """Return linear models about motions, one for each mode."""
-    ports = _ports(request)
-    with flagged(request):
+            return RequestedModels(models, [], modes, ports, parameters, model)
+        if motions is None:
+            motions = [_motion(model, request)] * len(modes)
         pairs = zip(motions, modes, strict=True)
-        about = [_in_motion(motion, mode, request.at or 0.0, ports) for motion, mode in pairs]
-        return RequestedModels(about, list(motions), list(modes), ports, parameters, model)
+        models = [_in_motion(motion, mode, request.at or 0.0, ports) for motion, mode in pairs]
+        return RequestedModels(models, motions, modes, ports, parameters, model)
 
 
 def moments_along(found: RequestedModels, count: int) -> list[list[LinearModel]]:
@@ -255,7 +243,7 @@ def _motion(model: Model, request: LinearRequest) -> TrackingTask | MotionRun:
             value=request.at,
             remedy=f"choose one up to {number(study.duration, 6)} s",
         )
-    compile_kernels_for(model.mechanism, plain_console(stderr=True).print)
+    compile_kernels_for(model.mechanism, PlainConsole(stderr=True).print)
     until = study.duration if request.along is not None or not request.at else request.at
     with locating_errors(model):
         return simulate_motion(

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Iterable, Sequence
 from dataclasses import asdict
 from typing import Any
 
+from rich.table import Table
+
 from paraflex.cli.commands.models import MethodsRequest
-from paraflex.cli.tables import plain_console, plain_table
+from paraflex.cli.tables import PlainConsole, plain_table
 from paraflex.integrators import DEFAULT_METHOD, METHODS, Method
 
 
@@ -16,18 +19,27 @@ def methods_command(request: MethodsRequest) -> None:
     if request.json:
         print(json.dumps([_figures(method) for method in METHODS.values()], indent=2))
         return
-    out = plain_console()
+    out = PlainConsole()
     heads = ("name", "title", "form", "order", "steps", "constraints")
-    rows = map(_row, METHODS.values())
-    out.print(plain_table(*heads, rows=rows, title="methods of integration", wrapped=("title", "form")))
+    out.print(_table("methods of integration", heads, ("title", "form"), map(_row, METHODS.values())))
     parameters = (
         [method.name, name, f"{one.default:g}", f"{one.low:.4g} to {one.high:.4g}", one.meaning]
         for method in METHODS.values()
         for name, one in method.parameters.items()
     )
     heads = ("method", "parameter", "default", "range", "meaning")
-    out.print(plain_table(*heads, rows=parameters, title="their parameters", wrapped=heads[2:]))
+    out.print(_table("their parameters", heads, heads[2:], parameters))
     out.print(f"The default is {DEFAULT_METHOD}; of the treatments of constraints, the first.")
+
+
+def _table(title: str, heads: Sequence[str], wrapped: Sequence[str], rows: Iterable[Sequence[str]]) -> Table:
+    """Return a table of texts; columns may be broken if their heads are in `wrapped`."""
+    table = plain_table(title)
+    for head in heads:
+        table.add_column(head, no_wrap=head not in wrapped)
+    for row in rows:
+        table.add_row(*row)
+    return table
 
 
 def _row(method: Method) -> list[str]:

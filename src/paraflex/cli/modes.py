@@ -14,12 +14,13 @@ from paraflex.actuation import Effort, actuation_condition
 from paraflex.actuation.allocation import check_mode
 from paraflex.cli.commands.models import ModesRequest
 from paraflex.cli.request import find_path, requested_model
-from paraflex.cli.tables import plain_console, print_table
+from paraflex.cli.tables import PlainConsole, print_table
 from paraflex.dynamics import build_system, closure_of, driven_freedoms, mobility
 from paraflex.errors import ActuationError
 from paraflex.figures.modes import mode_table
 from paraflex.files import Model
 from paraflex.mechanism import ActuationMode, mode_of_motors, parse_mode
+from paraflex.results.numbers import finite_or_none
 
 # Number of samples of the path at which modes are assessed.
 _SAMPLES = 201
@@ -42,13 +43,12 @@ def modes_command(request: ModesRequest) -> None:
         rows, more = _possible_rows(model, effort)
     for row in rows:
         row["declared"] = bool(named)
-    for line in _explain(model, path, rows, more):
-        plain_console(stderr=True).print(line, soft_wrap=True)
+    PlainConsole(stderr=True).print_lines(*_explain(model, path, rows, more))
     if request.json:
         print(json.dumps(rows, indent=2))
     elif rows:
         what = "actuation modes" if rows[0]["declared"] else "sets of motors"
-        print_table(plain_console(), mode_table(f"{model.mechanism.name}: {what}", rows))
+        print_table(PlainConsole(), mode_table(f"{model.mechanism.name}: {what}", rows))
 
 
 def _effort(model: Model, path: str | None) -> Effort | None:
@@ -68,9 +68,8 @@ def _row(mode: ActuationMode, effort: Effort | None) -> dict[str, Any]:
     row: dict[str, Any] = {"mode": mode.name, "motors": list(mode.motors)}
     if effort is None:
         return row
-    worst = float(np.max(actuation_condition(effort, mode)))
     row["redundancy"] = len(mode.motors) - effort.required.shape[1]
-    row["condition_max"] = worst if np.isfinite(worst) else None
+    row["condition_max"] = finite_or_none(np.max(actuation_condition(effort, mode)))
     try:
         check_mode(effort, mode)
         row["drives_path"] = True

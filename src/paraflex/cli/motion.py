@@ -6,38 +6,38 @@ import time
 import warnings
 from collections.abc import Sequence
 from dataclasses import asdict, replace
-from typing import Any
 
-from rich.console import Console
 from rich.progress import TimeElapsedColumn
 
 from paraflex.checks import check
-from paraflex.cli.bars import bars, stopped_at_end
+from paraflex.cli.bars import late_bar
 from paraflex.cli.collected import collected
 from paraflex.cli.commands.options import PlanChoice
 from paraflex.cli.commands.runs import RunRequest
-from paraflex.cli.ending import exit_code, print_results
-from paraflex.cli.integration import model_parameters
-from paraflex.cli.reduced_bodies import kept_coordinates, reduced_as_requested
+from paraflex.cli.ending import exit_code, print_location, print_results, write_drawn, write_numbers
+from paraflex.cli.integration import kept_coordinates, reduced_as_requested, run_parameters
 from paraflex.cli.replacing import hold_results
 from paraflex.cli.request import acting_controllers, command_provenance, controller_arguments, locating_errors
-from paraflex.cli.tables import controllers, loads, plain_console, reduction, validity
-from paraflex.cli.writing import write_drawn_run, write_numbers
+from paraflex.cli.run_lines import load_lines
+from paraflex.cli.tables import PlainConsole, print_table
 from paraflex.compilation import compile_kernels_for
 from paraflex.control import ControllerDescription
 from paraflex.designs.own_motion import own_run
 from paraflex.dynamics import State, build_system, standing_system
 from paraflex.dynamics.state import nearest_state
 from paraflex.errors import ControllerError, InputError, IntegrationError, ResultWarning, ValidityWarning, renamed
+from paraflex.figures.controllers import controller_table
+from paraflex.figures.reduction import reduced_words
 from paraflex.files import Model, StudyDefaults
 from paraflex.findings import DONE_STATUSES
-from paraflex.folders import RUN, ResultsFolder
-from paraflex.formatting import number
+from paraflex.folders import RUN
+from paraflex.formatting import number, quantity
 from paraflex.integrators import IntegrationOptions
 from paraflex.mechanism import Mechanism
 from paraflex.motion import MotionRun, state_at
 from paraflex.reduced_bodies import size_of
 from paraflex.results import motion_dataset, motion_summary
+from paraflex.results.findings import validity_line
 from paraflex.results.reduced_runs import compared_with_full
 
 # Largest number of singular positions listed.
@@ -48,14 +48,8 @@ _MOST_POINTS = 20
 _ROUNDING = 1e-12
 
 
-def run_motion(
-    request: RunRequest,
-    model: Model,
-    mechanism: Mechanism,
-    options: IntegrationOptions,
-    how: dict[str, Any],
-) -> int:
-    """Run a mechanism's own motion, write results with the integration settings `how`; return the exit code."""
+def run_motion(request: RunRequest, model: Model, mechanism: Mechanism, options: IntegrationOptions) -> int:
+    """Run a mechanism's own motion and write results; return the exit code."""
     study = own_motion(model, request.plan)
     if request.modes:
         raise InputError(
@@ -71,59 +65,51 @@ def run_motion(
             remedy="leave it out",
         )
     with hold_results(request.out, RUN, force=request.force) as folder:
-        return _run_held(request, replace(model, study=study), mechanism, options, how, folder)
+        console, model = PlainConsole(stderr=True), replace(model, study=study)
+        compile_kernels_for(mechanism, console.print)
+        began = time.perf_counter()
+        controllers = acting_controllers(model, request)
+        full = _simulate(console, model, mechanism, options, controllers, balanced=request.balanced)
+        run, kept = full, kept_coordinates(request, study)
+        # A full run that failed is no reference for a reduced one.
+        if kept is not None and full.solution.status in DONE_STATUSES:
+            few = reduced_as_requested(request, full, kept)
+            start = None
+            if not request.balanced:
+                start = nearest_state(build_system(few), full.system, _first(full))
+            run = _simulate(console, model, few, options, controllers, balanced=request.balanced, start=start)
+        requested = {
+            "duration": study.duration,
+            "samples": study.samples,
+            "controllers": controller_arguments(model, controllers),
+        }
+        parameters = command_provenance(model, requested | run_parameters(request, mechanism, options, kept))
+        seen = check(model, assembly=request.plan.assembly)
+        data = motion_dataset(run, options=options, parameters=parameters, findings=collected(seen))
+        if run is not full:
+            sizes = [size_of(one.system, _first(one)) for one in (run, full)]
+            data = compared_with_full(data, motion_dataset(full, options=options), *sizes)
+        summary = motion_summary(data)
+        write_numbers(data, summary, folder)
+        print_results(summary, lambda out: _report(out, summary), as_json=request.json)
+        finished = run.solution.status in DONE_STATUSES
+        try:
+            write_drawn(data, folder, request.drawn)
+        finally:
+            if not finished:
+                message = run.solution.message
+                kept = run.solution.status == "interrupted"
+                console.print_lines(f"{message}; results until then are kept" if kept else f"error: {message}")
+        print_location(began, "results", folder.path, request.drawn, as_json=request.json)
+        return exit_code(finished, interrupted=run.solution.status == "interrupted")
 
 
-def _run_held(
-    request: RunRequest,
-    model: Model,
-    mechanism: Mechanism,
-    options: IntegrationOptions,
-    how: dict[str, Any],
-    folder: ResultsFolder,
-) -> int:
-    console, study = plain_console(stderr=True), model.study
-    compile_kernels_for(mechanism, console.print)
-    began = time.perf_counter()
-    controllers = acting_controllers(model, request)
-    full = _simulate(console, model, mechanism, options, controllers, balanced=request.balanced)
-    run, kept = full, kept_coordinates(request, study)
-    # A full run that failed is no reference for a reduced one.
-    if kept is not None and full.solution.status in DONE_STATUSES:
-        few = reduced_as_requested(request, full, kept)
-        start = None
-        if not request.balanced:
-            start = nearest_state(build_system(few), full.system, State(0.0, full.solution.q[0], full.solution.v[0]))
-        run = _simulate(console, model, few, options, controllers, balanced=request.balanced, start=start)
-    requested = {
-        "duration": study.duration,
-        "samples": study.samples,
-        "controllers": controller_arguments(model, controllers),
-    }
-    parameters = command_provenance(model, requested | model_parameters(request, mechanism, kept) | how)
-    seen = check(model, assembly=request.plan.assembly)
-    data = motion_dataset(run, options=options, parameters=parameters, findings=collected(seen))
-    if run is not full:
-        sizes = [size_of(one.system, State(0.0, one.solution.q[0], one.solution.v[0])) for one in (run, full)]
-        data = compared_with_full(data, motion_dataset(full, options=options), *sizes)
-    summary = motion_summary(data)
-    write_numbers(data, summary, folder)
-    print_results(summary, lambda out: _report(out, summary), as_json=request.json)
-    finished = run.solution.status in DONE_STATUSES
-    try:
-        place = write_drawn_run(data, folder, request, began)
-    finally:
-        if not finished:
-            message = run.solution.message
-            kept = run.solution.status == "interrupted"
-            console.print(f"{message}; results until then are kept" if kept else f"error: {message}", soft_wrap=True)
-    if not request.json:
-        console.print(place, soft_wrap=True)
-    return exit_code(finished, interrupted=run.solution.status == "interrupted")
+def _first(run: MotionRun) -> State:
+    return State(0.0, run.solution.q[0], run.solution.v[0])
 
 
 def _simulate(
-    console: Console,
+    console: PlainConsole,
     model: Model,
     mechanism: Mechanism,
     options: IntegrationOptions,
@@ -132,20 +118,21 @@ def _simulate(
     balanced: bool = False,
     start: State | None = None,
 ) -> MotionRun:
-    study, progress = model.study, bars(console, TimeElapsedColumn())
-    bar = progress.add_task(mechanism.name, total=study.duration)
-
-    def report(reached: float) -> None:
-        progress.start()
-        progress.update(bar, completed=reached)
-
+    study = model.study
     try:
-        with locating_errors(model), stopped_at_end(progress), warnings.catch_warnings():
+        with (
+            locating_errors(model),
+            late_bar(console, mechanism.name, study.duration, TimeElapsedColumn()) as update,
+            warnings.catch_warnings(),
+        ):
             begun = start or start_of(model, mechanism, study.assembly, balanced=balanced) or study.assembly
             # The table and the summary report these findings.
             warnings.simplefilter("ignore", ValidityWarning)
             warnings.simplefilter("ignore", ResultWarning)
-            return own_run(mechanism, study, controllers, start=begun, options=options, on_progress=report)
+            return own_run(
+                mechanism, study, controllers, start=begun, options=options,
+                on_progress=lambda reached: update(completed=reached),
+            )  # fmt: skip
     except (IntegrationError, ControllerError) as error:
         return error.partial
 
@@ -183,14 +170,18 @@ def _ended(summary: dict) -> str:
     )
 
 
-def _report(out: Console, summary: dict) -> None:
+def _report(out: PlainConsole, summary: dict) -> None:
     final = summary["final"]
     out.print(f"{summary['mechanism']}: {_ended(summary)}")
     if summary["event"]:
-        out.print(summary["message"], soft_wrap=True)
-    reduction(out, summary)
-    loads(out, {"": summary["loads"]})
-    controllers(out, [((), summary)])
+        out.print_lines(summary["message"])
+    if (reduced := summary.get("reduction")) is not None:
+        out.print_lines(
+            f"{reduced_words(reduced)}: points are up to {quantity(reduced['distance'], 'm', digits=2)} from their "
+            f"positions in the full run, in {number(summary['wall_time'] / reduced['full_wall_time'], 2)} of its time"
+        )
+    out.print_lines(*load_lines({"": summary["loads"]}))
+    print_table(out, controller_table({(): summary}))
     out.print("at the end:")
     # Points at which finite segments are connected by the program are left out.
     places = {point: at for point, at in final["point_position"].items() if None not in at and "._" not in point}
@@ -211,4 +202,4 @@ def _report(out: Console, summary: dict) -> None:
         f"largest violation of constraints {number(summary['constraint_position_max'], 2)} m, "
         f"imbalance of energy {number(summary['energy_balance_max'], 2)} J"
     )
-    validity(out, {"": summary["validity"]})
+    out.print_lines(validity_line({"": summary["validity"]}))

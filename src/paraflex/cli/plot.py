@@ -7,7 +7,6 @@ from pathlib import Path
 
 import typer
 
-from paraflex.cli import COMPLETE
 from paraflex.cli.commands.results import PlotRequest
 from paraflex.errors import InputError, suggestion
 from paraflex.plots.planned import drawings, figures_of, find_figure
@@ -19,13 +18,13 @@ STYLES = ("single", "double")
 _DENSEST = 2400.0
 
 
-def plot_command(request: PlotRequest) -> int:
-    """Draw the requested figures and print their files, or list the available ones; return the exit code."""
+def plot_command(request: PlotRequest) -> None:
+    """Draw the requested figures and print their files, or list the available ones."""
     _check(request)
     source = open_source(request.results)
     if request.only_list or not request.figures:
         _list(source, request.results)
-        return COMPLETE
+        return
     if request.figures == [ALL]:
         chosen = [figure for figure in figures_of(source) if figure.points or not request.points] or figures_of(source)
     else:
@@ -40,7 +39,6 @@ def plot_command(request: PlotRequest) -> int:
     written = write_figures(drawn, folder, formats, style=request.style, dpi=request.dpi, force=request.force)
     for file in written:
         typer.echo(file)
-    return COMPLETE
 
 
 def _check(request: PlotRequest) -> None:

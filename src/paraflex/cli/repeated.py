@@ -17,7 +17,7 @@ from paraflex.cli.integration import integration_options
 from paraflex.cli.motion import own_motion, start_of
 from paraflex.cli.request import acting_controllers, find_path, requested_model
 from paraflex.cli.run import requested_mechanism
-from paraflex.cli.tables import plain_console
+from paraflex.cli.tables import PlainConsole
 from paraflex.compilation import compile_kernels_for
 from paraflex.designs.own_motion import own_run
 from paraflex.errors import InputError
@@ -87,7 +87,7 @@ def _runs(
     model: Model, request: RunRequest, path: str | None, modes: Sequence[str]
 ) -> Iterator[TrackingRun | MotionRun]:
     mechanism, options = requested_mechanism(model, request), integration_options(request, model.study)
-    compile_kernels_for(mechanism, plain_console(stderr=True).print)
+    compile_kernels_for(mechanism, PlainConsole(stderr=True).print)
     controllers = acting_controllers(model, request)
     if path is None:
         study = own_motion(model, request.plan)

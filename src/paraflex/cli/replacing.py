@@ -8,8 +8,8 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from paraflex.cli.tables import few, plain_console
-from paraflex.errors import InputError
+from paraflex.cli.tables import PlainConsole
+from paraflex.errors import InputError, listed
 from paraflex.folders import (
     COMPARISON,
     FOLDER_FILES,
@@ -72,9 +72,8 @@ def print_replaced(folder: Path) -> None:
             f"{folder} holds {_described(folder, kind)}; it will be replaced (--out another folder keeps both)"
         )
     if foreign:
-        lines.append(f"{folder} holds files not written by paraflex, which stay: {few(foreign, _NAMED)}")
-    for line in lines:
-        plain_console(stderr=True).print(line, soft_wrap=True)
+        lines.append(f"{folder} holds files not written by paraflex, which stay: {listed(foreign, _NAMED)}")
+    PlainConsole(stderr=True).print_lines(*lines)
 
 
 def _described(folder: Path, kind: str) -> str:

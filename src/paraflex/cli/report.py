@@ -6,10 +6,9 @@ from importlib import import_module
 from pathlib import Path
 
 import xarray as xr
-from rich.console import Console
 
 from paraflex.cli.commands.results import ReportRequest
-from paraflex.cli.tables import plain_console
+from paraflex.cli.tables import PlainConsole
 from paraflex.errors import InputError
 from paraflex.folders import RESULT_KINDS
 from paraflex.report import Page, save_page
@@ -29,8 +28,8 @@ def report_command(request: ReportRequest) -> None:
     if study is None:
         save_page(page_of(open_results(file), file.parent), target)
     else:
-        save_study_report(study, plain_console(stderr=True), target)
-    plain_console(stderr=True).print(f"report in {target}", soft_wrap=True)
+        save_study_report(study, PlainConsole(stderr=True), target)
+    PlainConsole(stderr=True).print_lines(f"report in {target}")
 
 
 def study_of(results: Path) -> Path | None:
@@ -41,11 +40,11 @@ def study_of(results: Path) -> Path | None:
     return folder if (folder / STUDY).is_file() else None
 
 
-def save_study_report(folder: Path, console: Console, target: Path | None = None) -> None:
+def save_study_report(folder: Path, console: PlainConsole, target: Path | None = None) -> None:
     """Write the report of a study's folder, and print the steps that take time."""
     from paraflex.studies.sweeps.report import study_page
 
-    page = study_page(folder, lambda doing: console.print(doing, soft_wrap=True))
+    page = study_page(folder, console.print_lines)
     save_page(page, folder / "report.html" if target is None else target)
 
 

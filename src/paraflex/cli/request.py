@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict
@@ -122,6 +123,12 @@ def plan_study(
             return model.plan(path, mechanism=mechanism, **asdict(chosen), after=after, warning=False)
         except UnreachablePathError as error:
             raise InputError(error.problem, field=f"path.{path_name}", remedy=error.remedy) from error
+
+
+def check_time(at: float) -> None:
+    """Check that the value of --at is a time at which a motion may be."""
+    if not (math.isfinite(at) and at >= 0.0):
+        raise InputError("not a time of the motion", field="--at", value=at, remedy="give it in s, not negative")
 
 
 @contextmanager

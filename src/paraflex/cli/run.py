@@ -10,10 +10,11 @@ from pathlib import Path
 from paraflex.cli.along import run_along
 from paraflex.cli.commands.requests import conflict, flagged
 from paraflex.cli.commands.runs import RunRequest
-from paraflex.cli.integration import check_stops, given_flags, integration_options, integration_parameters
+from paraflex.cli.integration import given_flags, integration_options
 from paraflex.cli.motion import run_motion
 from paraflex.cli.replacing import hold_results
 from paraflex.cli.request import find_modes, find_paths, requested_model, with_frames
+from paraflex.cli.stops import check_stops
 from paraflex.errors import InputError
 from paraflex.files import Model
 from paraflex.folders import RUN
@@ -26,11 +27,10 @@ def run_command(request: RunRequest) -> int:
     model = requested_model(request.model)
     _check_fidelity(request)
     options = integration_options(request, model.study)
-    how = {} if request.ked else integration_parameters(options, request.stop_at)
     if not model.paths and not request.paths:
         mechanism = _without_path(model, request)
         check_stops(mechanism, options, request.stop_at)
-        return run_motion(request, model, mechanism, options, how)
+        return run_motion(request, model, mechanism, options)
     paths, modes = find_paths(model, request.paths or model.study.paths), find_modes(model, request.modes)
     # All checks that need no computation come before the long runs.
     with ExitStack() as held:
@@ -38,7 +38,7 @@ def run_command(request: RunRequest) -> int:
             name: (paths[name], held.enter_context(hold_results(folder, RUN, force=request.force)))
             for name, folder in _folders(paths, Path(request.out)).items()
         }
-        return run_along(request, model, requested_mechanism(model, request), followed, modes, options, how)
+        return run_along(request, model, requested_mechanism(model, request), followed, modes, options)
 
 
 def _folders(paths: Iterable[str], out: Path) -> dict[str, Path]:

@@ -1,4 +1,4 @@
-"""Common parts of the commands that search for designs: run, progress bar, output, figures, exit code."""
+"""`paraflex optimise` and `paraflex identify`: searches for designs, continued when called again."""
 
 from __future__ import annotations
 
@@ -6,29 +6,38 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TypeVar
 
-from rich.console import Console
-
 from paraflex.campaign import Progress
 from paraflex.cli import signals
 from paraflex.cli.bars import bars
 from paraflex.cli.commands.studies import SearchRequest
 from paraflex.cli.ending import exit_code, print_results
-from paraflex.cli.tables import plain_console, print_table
+from paraflex.cli.tables import PlainConsole, print_table
 from paraflex.compilation import compile_kernels_for
+from paraflex.figures.designs import column_label
 from paraflex.figures.search import tables
-from paraflex.formatting import number, quantity
+from paraflex.formatting import common_unit, number, quantity
 from paraflex.plots import save_figures
+from paraflex.studies import load_identification, load_optimisation
 from paraflex.studies.optimisation.identify import IdentificationResult
 from paraflex.studies.optimisation.optimise import OptimisationResult
 from paraflex.studies.optimisation.study import DesignStudy
 
 R = TypeVar("R", OptimisationResult, IdentificationResult)
-Report = Callable[[Console, R], None]
 
 
-def search_command(request: SearchRequest, study: DesignStudy[R], report: Report[R], what: str) -> int:
+def optimise_command(request: SearchRequest) -> int:
+    """Run or continue an optimisation; return the exit code."""
+    return _search(request, load_optimisation(request.study), _report_optimum, "objective")
+
+
+def identify_command(request: SearchRequest) -> int:
+    """Run or continue an identification; return the exit code."""
+    return _search(request, load_identification(request.study), _report_fit, "residual")
+
+
+def _search(request: SearchRequest, study: DesignStudy[R], report: Callable[[PlainConsole, R], None], what: str) -> int:
     """Run or continue a search, print its result and write its figures; return the exit code."""
-    console = plain_console(stderr=True)
+    console = PlainConsole(stderr=True)
     compile_kernels_for(study.base.model().mechanism, console.print)
     result = _with_bar(console, study, request, what)
     if result.interrupted and not result.values:
@@ -37,7 +46,7 @@ def search_command(request: SearchRequest, study: DesignStudy[R], report: Report
     numbers = result.to_dict()
     verdict = study.base.setting.verdict()
 
-    def show(out: Console) -> None:
+    def show(out: PlainConsole) -> None:
         for table in tables(numbers, result.units):
             print_table(out, table)
         report(out, result)
@@ -50,7 +59,7 @@ def search_command(request: SearchRequest, study: DesignStudy[R], report: Report
     return exit_code(bool(result.values), interrupted=result.interrupted)
 
 
-def _with_bar(console: Console, study: DesignStudy[R], request: SearchRequest, what: str) -> R:
+def _with_bar(console: PlainConsole, study: DesignStudy[R], request: SearchRequest, what: str) -> R:
     with bars(console, "{task.completed} designs, at most {task.total}", "{task.fields[best]}") as progress:
         bar = progress.add_task(study.name, total=study.search.evaluations, best="")
 
@@ -61,14 +70,46 @@ def _with_bar(console: Console, study: DesignStudy[R], request: SearchRequest, w
         return study.run(request.folder, workers=request.workers.chosen, on_progress=show_progress)
 
 
-def _print_ending(console: Console, result: OptimisationResult | IdentificationResult, folder: Path) -> None:
-    out = plain_console()
+def _print_ending(console: PlainConsole, result: OptimisationResult | IdentificationResult, folder: Path) -> None:
+    out = PlainConsole()
     failed = f", {result.failed} of them failed" if result.failed else ""
     out.print(f"{result.evaluations} designs{failed}; {result.stopped}")
     for reason in result.reasons[:1]:
-        console.print(f"a design that failed: {reason}", soft_wrap=True)
+        console.print_lines(f"a design that failed: {reason}")
     console.print(f"{result.fresh} designs in {quantity(result.seconds, 's', padded=False)} now")
     if result.interrupted:
-        console.print(f"interrupted; so far: {result.table}; the same command continues from there", soft_wrap=True)
+        console.print_lines(f"interrupted; so far: {result.table}; the same command continues from there")
     else:
-        console.print(f"every run: {result.table}; the best mechanism: {folder / 'best.toml'}", soft_wrap=True)
+        console.print_lines(f"every run: {result.table}; the best mechanism: {folder / 'best.toml'}")
+
+
+def _report_optimum(console: PlainConsole, result: OptimisationResult) -> None:
+    for name, limit in [] if result.holds_limits else result.goal["limits"]:
+        unit, value = result.units[name], result.metrics[name]
+        if value > limit:
+            shown = common_unit(unit, (limit, value - limit))
+            of, over = (quantity(one, unit, shown, digits=5, padded=False) for one in (limit, value - limit))
+            console.print_lines(f"limit exceeded: {column_label(name)} is above {of} by {over}")
+    if not result.holds_limits:
+        console.print("no design satisfies all limits: this one, in best.toml, exceeds them least")
+
+
+def _report_fit(console: PlainConsole, result: IdentificationResult) -> None:
+    found = result.confidence
+    now, start = number(result.residual), number(result.start_residual)
+    console.print(f"root mean square residual {now}, {start} at the start")
+    console.print_lines(f"derivatives: {result.derivatives or 'none were needed'}")
+    if found is None:
+        console.print_lines(f"deviations not given: {result.stopped} before derivatives there were known")
+        return
+    for reason in dict.fromkeys(found.reasons.values()):
+        names = ", ".join(name for name, why in found.reasons.items() if why == reason)
+        console.print_lines(f"deviations not given of {names}: {reason}")
+    if found.identifiable:
+        console.print(f"condition of the Jacobian {number(found.condition, 3)}, degrees of freedom {found.freedom}")
+    else:
+        described = ", ".join(f"{share:+.2f} {name}" for name, share in found.weakest.items())
+        console.print(
+            f"the targets cannot distinguish the parameters (condition {number(found.condition, 3)}): they hardly "
+            f"change along {described}, as fractions of the ranges"
+        )

@@ -4,14 +4,11 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-from rich.console import Console
-
 from paraflex.cli import COMPLETE
 from paraflex.cli.commands.studies import SensitivityRequest
-from paraflex.cli.ending import print_results
+from paraflex.cli.ending import print_results, write_drawn
 from paraflex.cli.replacing import hold_results
-from paraflex.cli.tables import print_table
-from paraflex.cli.writing import write_drawn
+from paraflex.cli.tables import PlainConsole, print_table
 from paraflex.designs.setting import Setting
 from paraflex.designs.units import check_unit_of
 from paraflex.errors import InputError
@@ -36,12 +33,12 @@ def sensitivity_command(request: SensitivityRequest) -> int:
         found.save_in(held)
         summary = found.to_dict()
 
-        def show(out: Console) -> None:
+        def show(out: PlainConsole) -> None:
             for run in range(len(found.rows)):
                 for first in range(0, len(found.parameters), _PARAMETERS_ABREAST):
                     for table in tables(summary, run, found.parameters[first : first + _PARAMETERS_ABREAST]):
                         print_table(out, table)
-            out.print(f"{folder / found.values_file}, {TABLE}, {LINES} and {FIGURES}/", soft_wrap=True)
+            out.print_lines(f"{folder / found.values_file}, {TABLE}, {LINES} and {FIGURES}/")
 
         print_results(summary, show, as_json=request.json)
         write_drawn(summary, held)

@@ -2,22 +2,25 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
-from typing import Any
 
+import numpy as np
 import xarray as xr
 
 from paraflex.cli import COMPLETE, FAILURE
 from paraflex.cli.commands.models import StaticsRequest
 from paraflex.cli.commands.requests import flagged
-from paraflex.cli.dataset_command import DatasetCommand
+from paraflex.cli.ending import give_dataset
 from paraflex.cli.request import command_provenance, of_assembly, requested_model
-from paraflex.cli.statics_tables import print_statics
-from paraflex.equilibria import Statics, StaticsDefaults, statics
+from paraflex.cli.tables import PlainConsole, print_tables
+from paraflex.equilibria import StaticsDefaults, statics
 from paraflex.equilibria.conditions import coordinate_named
 from paraflex.errors import AssemblyError, EquilibriumError, InputError, renamed
+from paraflex.figures import equilibria
 from paraflex.files import Model
 from paraflex.files.fields import number_in
+from paraflex.formatting import number, quantity
 from paraflex.results.statics_data import statics_dataset, statics_summary
 
 _NONE = "none"
@@ -26,32 +29,28 @@ _NONE = "none"
 def statics_command(request: StaticsRequest) -> int:
     """Compute the equilibria, print them and, with --out, write files; return the exit code."""
     model = requested_model(request.model)
-    data = _COMMAND.run(request.files, lambda: _data(model, request))
+    data = give_dataset("statics", lambda: _data(model, request), statics_summary, _print_statics, request.files)
     return COMPLETE if data["status"].item() == "complete" else FAILURE
 
 
-_COMMAND = DatasetCommand("statics", statics_summary, print_statics)
-
-
 def _data(model: Model, request: StaticsRequest) -> xr.Dataset:
-    requested = _requested(model, request)
-    return statics_dataset(_found(model, requested, request), parameters=_parameters(model, requested, request))
-
-
-def _found(model: Model, requested: StaticsDefaults, request: StaticsRequest) -> Statics:
     """Return the equilibria, or those before the first that is not found."""
+    requested = _requested(model, request)
     with flagged(request, first=True):
         try:
-            return statics(
+            found = statics(
                 model, **vars(requested), warning=False,
                 assembly=request.assembly or (None if model.start is not None else model.study.assembly),
             )  # fmt: skip
         except EquilibriumError as error:
             if error.partial is None:
                 raise
-            return error.partial
+            found = error.partial
         except AssemblyError as error:
             raise of_assembly(error, model) from error
+    given = {name: value for name, value in (vars(requested) | {"assembly": request.assembly}).items()
+             if value is not None and value != {}}  # fmt: skip
+    return statics_dataset(found, parameters=command_provenance(model, {"statics": True} | given))
 
 
 def _requested(model: Model, request: StaticsRequest) -> StaticsDefaults:
@@ -101,8 +100,41 @@ def _in_unit(text: str, unit: str, field: str) -> float:
         return number_in(text, unit)
 
 
-def _parameters(model: Model, requested: StaticsDefaults, request: StaticsRequest) -> dict[str, Any]:
-    """Return the provenance of the equilibria."""
-    given = {name: value for name, value in (vars(requested) | {"assembly": request.assembly}).items()
-             if value is not None and value != {}}  # fmt: skip
-    return command_provenance(model, {"statics": True} | given)
+def _print_statics(out: PlainConsole, data: xr.Dataset) -> None:
+    """Print equilibria: a table of steps, details of the last one, then frequencies, buckling, stress and validity."""
+    summary = statics_summary(data)
+    points = len(summary["limit_points"])
+    also = f", {points} limit point{'s' * (points > 1)}" if points else ""
+    out.print_lines(f"{data.attrs['mechanism']}: {data.sizes['step']} equilibria{also}")
+    steps = [equilibria.step_table(data)] if data.sizes["step"] > 1 else []
+    print_tables(out, [*steps, *equilibria.last_tables(data)])
+    out.print_lines(*_lines(data, summary))
+
+
+def _lines(data: xr.Dataset, summary: dict) -> list[str]:
+    lines = []
+    last = data.isel(step=-1)
+    for name, word in equilibria.lowest_frequencies(data).items():
+        kept = "moved coordinates released" if word == "free" else "held and moved coordinates fixed"
+        values = last[name].values[np.isfinite(last[name].values)]
+        known = ", ".join(map(number, values))
+        kept += ", 0 for growing motions" if np.any(values == 0.0) else ""
+        lines.append(f"{'free ' if word == 'free' else ''}frequencies: {known} Hz, {kept}")
+    if words := equilibria.buckling_words(data):
+        lines.append(f"buckling at {words}")
+    elif words := equilibria.no_buckling(data):
+        lines.append(words)
+    if equilibria.is_stressed(data):
+        body = int(np.nanargmax(data["stress_max"].values))
+        one = data.isel(body=body)
+        safety = float(one["safety_factor"])
+        also = "" if math.isnan(safety) else f"; safety factor {number(safety, 3)}"
+        lines.append(
+            f"largest stress {quantity(float(one['stress_max']), 'Pa', digits=4)} in {one['body'].item()} at "
+            f"{quantity(float(one['stress_place']), 'm')}, step {int(one['stress_step'])}{also}"
+        )
+    if data.sizes["step"] > 1 and summary["validity"] is not None and summary["validity"]["holds"]:
+        lines.append(f"validity: {summary['validity']['verdict']}")
+    if summary["status"] != "complete":
+        lines.append(f"error: {summary['message']}")
+    return lines

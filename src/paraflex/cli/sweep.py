@@ -1,27 +1,29 @@
-"""`paraflex sweep`: thousands of runs of a mechanism with varied numbers, continued when called again."""
+"""`paraflex sweep` and `paraflex indices`: thousands of runs with varied numbers, continued when called again."""
 
 from __future__ import annotations
 
 import time
 from pathlib import Path
-
-from rich.console import Console
+from typing import Any
 
 from paraflex.campaign import Progress
+from paraflex.cli import COMPLETE, signals
 from paraflex.cli.bars import bars
-from paraflex.cli.commands.studies import SweepRequest
+from paraflex.cli.commands.studies import IndicesRequest, SweepRequest
 from paraflex.cli.ending import exit_code, print_results
-from paraflex.cli.tables import plain_console
+from paraflex.cli.tables import PlainConsole, print_table
 from paraflex.compilation import compile_kernels_for
 from paraflex.designs.measure import beyond_limits, coarse_runs
 from paraflex.designs.sweep import SweepResult, SweepStudy
+from paraflex.figures.search import index_table
 from paraflex.formatting import number, quantity
-from paraflex.studies import load_sweep
+from paraflex.studies import load_indices, load_sweep
+from paraflex.studies.optimisation.indices import IndicesResult
 
 
 def sweep_command(request: SweepRequest) -> int:
     """Run or continue a sweep; return the exit code."""
-    console = plain_console(stderr=True)
+    console = PlainConsole(stderr=True)
     study = load_sweep(request.study)
     folder = request.folder
     compile_kernels_for(study.model().mechanism, console.print)
@@ -39,7 +41,7 @@ def sweep_command(request: SweepRequest) -> int:
     return exit_code(not result.done or bool(result.counts.get("complete")), interrupted=result.interrupted)
 
 
-def _sweep(console: Console, study: SweepStudy, folder: Path, request: SweepRequest) -> SweepResult:
+def _sweep(console: PlainConsole, study: SweepStudy, folder: Path, request: SweepRequest) -> SweepResult:
     with bars(console, "{task.completed}/{task.total} runs", "{task.fields[pace]}") as progress:
         bar = progress.add_task(study.name, total=study.runs, pace="", start=False)
 
@@ -51,35 +53,73 @@ def _sweep(console: Console, study: SweepStudy, folder: Path, request: SweepRequ
         return study.run(folder, workers=request.workers.chosen, on_progress=report, limit=request.limit)
 
 
-def _write_report(console: Console, folder: Path, result: SweepResult) -> None:
+def _write_report(console: PlainConsole, folder: Path, result: SweepResult) -> None:
     """Write the report, unless the sweep was interrupted: the user should not have to wait for it."""
     from paraflex.cli.report import save_study_report
 
     if result.interrupted:
-        console.print(f"no report: paraflex report {folder} writes it", soft_wrap=True)
+        console.print_lines(f"no report: paraflex report {folder} writes it")
         return
     save_study_report(folder, console)
-    console.print(f"report: {folder / 'report.html'}", soft_wrap=True)
+    console.print_lines(f"report: {folder / 'report.html'}")
 
 
-def _report(console: Console, result: SweepResult) -> None:
+def _report(console: PlainConsole, result: SweepResult) -> None:
     statuses = ", ".join(f"{number} {status}" for status, number in sorted(result.counts.items()))
-    plain_console().print(f"{result.done} of {result.total} runs: {statuses or 'none yet'}")
+    PlainConsole().print(f"{result.done} of {result.total} runs: {statuses or 'none yet'}")
     if result.beyond:
-        plain_console().print(f"warning: {beyond_limits(result.beyond)}", soft_wrap=True)
+        PlainConsole().print_lines(f"warning: {beyond_limits(result.beyond)}")
     if result.coarse:
-        plain_console().print(f"warning: {coarse_runs(result.coarse)}", soft_wrap=True)
+        PlainConsole().print_lines(f"warning: {coarse_runs(result.coarse)}")
     if result.fresh:
         console.print(
             f"{result.fresh} of them in {quantity(result.seconds, 's', padded=False)} now, "
             f"{number(result.fresh / result.seconds, 3)} runs/s"
         )
     if result.complete:
-        console.print(f"one table: {result.table}", soft_wrap=True)
+        console.print_lines(f"one table: {result.table}")
     else:
         stopped = "interrupted; " if result.interrupted else ""
-        console.print(f"{stopped}so far: {result.table}; the same command continues from there", soft_wrap=True)
+        console.print_lines(f"{stopped}so far: {result.table}; the same command continues from there")
 
 
 def _clock(seconds: float) -> str:
     return time.strftime("%H:%M:%S", time.gmtime(seconds)) if seconds < 86_400 else f"{seconds / 86_400:.1f} days"
+
+
+def indices_command(request: IndicesRequest) -> int:
+    """Run or continue the study and print the indices; return the exit code."""
+    console = PlainConsole(stderr=True)
+    study = load_indices(request.study, request.metrics, request.samples, request.seed)
+    compile_kernels_for(study.sweep.model().mechanism, console.print)
+    with bars(console, "{task.completed}/{task.total}") as progress:
+        bar = progress.add_task(study.sweep.name, total=study.sweep.runs)
+        result = study.run(
+            request.folder, workers=request.workers.chosen,
+            on_progress=lambda at: progress.update(bar, completed=at.done),
+        )  # fmt: skip
+    if not result.complete:
+        console.print_lines(f"interrupted; so far: {result.sweep.table}; the same command continues from there")
+        return signals.exit_code()
+    numbers = result.to_dict()
+    verdict = study.sweep.setting.verdict()
+
+    def show(out: PlainConsole) -> None:
+        _report_indices(out, result, numbers)
+        console.print_lines(f"indices: {result.table}; every run: {result.sweep.table}")
+
+    print_results(numbers | {"verdict": verdict.to_dict()}, show, as_json=request.json, findings=verdict)
+    from paraflex.plots import save_figures  # its import takes a second
+
+    save_figures(numbers, request.folder / "figures")
+    return COMPLETE
+
+
+def _report_indices(console: PlainConsole, result: IndicesResult, found: dict[str, Any]) -> None:
+    print_table(console, index_table(found))
+    indices = result.indices
+    for k, dropped in enumerate(indices["dropped"].values):
+        if dropped:
+            share = f"{dropped} of {dropped + indices['samples'].values[k]} base samples"
+            where = ", ".join(filter(None, (str(indices[name].values[k]) for name in ("metric", "path", "mode"))))
+            console.print_lines(f"{where}: {share} left out: not all their runs are complete")

@@ -5,12 +5,10 @@ from __future__ import annotations
 import time
 from dataclasses import asdict
 
-from rich.console import Console
-
 from paraflex.cli.bars import counting
 from paraflex.cli.commands.requests import flagged
 from paraflex.cli.commands.runs import VerifyRequest
-from paraflex.cli.ending import exit_code, print_location, print_results
+from paraflex.cli.ending import exit_code, print_location, print_results, write_drawn
 from paraflex.cli.replacing import hold_results
 from paraflex.cli.request import (
     command_provenance,
@@ -21,16 +19,13 @@ from paraflex.cli.request import (
     requested_model,
     with_frames,
 )
-from paraflex.cli.tables import plain_console, print_table
-from paraflex.cli.writing import write_drawn
+from paraflex.cli.tables import PlainConsole, print_table
 from paraflex.compilation import compile_kernels
 from paraflex.engines import ENGINES
 from paraflex.errors import InputError, suggestion
 from paraflex.figures.verification import distance_table, link_tables, model_table, path_extent, printed
-from paraflex.files import Model
-from paraflex.folders import VERIFICATION, ResultsFolder
-from paraflex.kinematics import Path
-from paraflex.mechanism import ActuationMode, Geometry
+from paraflex.folders import VERIFICATION
+from paraflex.mechanism import Geometry
 from paraflex.results.following import SPAN_WORDS, ErrorSpan
 from paraflex.studies.verification import FIDELITIES, VerificationOptions, VerificationStudy, check_model
 
@@ -40,61 +35,49 @@ def verify_command(request: VerifyRequest) -> int:
     model = requested_model(request.model)
     path, path_name = find_path(model, request.path)
     modes = find_modes(model, request.modes) if request.modes else [find_mode(model, [])]
-    _options(request)
-    models = _models(request)
+    options, models = _options(request), _models(request)
+    mechanism = with_frames(model.mechanism, request.frames)
     for name in models:
-        check_model(name, with_frames(model.mechanism, request.frames))
+        check_model(name, mechanism)
     with hold_results(request.out, VERIFICATION, force=request.force) as folder:
-        return _verify(request, model, (path, path_name), modes, models, folder)
-
-
-def _verify(
-    request: VerifyRequest,
-    model: Model,
-    along: tuple[Path, str],
-    modes: list[ActuationMode],
-    models: list[str],
-    folder: ResultsFolder,
-) -> int:
-    """Run all models along a path, given with its name; write results into the held folder and return the exit code."""
-    console, (path, path_name) = plain_console(stderr=True), along
-    options, mechanism = _options(request), with_frames(model.mechanism, request.frames)
-    for geometry in Geometry:
-        if geometry is Geometry.LINEAR or "second-order" in models:
-            compile_kernels(geometry, console.print)
-    began = time.perf_counter()
-    task = plan_study(model, mechanism, path, path_name, request.plan)
-    requested = {"path": path_name, "modes": [mode.name for mode in modes]} | asdict(request.frames) | asdict(options)
-    requested |= {"method": options.method.name, "method_parameters": options.method.values}
-    study = VerificationStudy(task, modes, models, options, command_provenance(model, requested), model.study.error)
-    with counting(console) as report:
-        verification = study.run(on_progress=report)
-    summary = verification.to_dict()
-    data = verification.data
-    if data is not None:
-        verification.save_in(folder)
-
-    def show(out: Console) -> None:
-        span, extent = SPAN_WORDS[ErrorSpan(summary["error"])], path_extent(data)
-        out.print(f"{summary['mechanism']}: RMS tracking error {span}, and distances from the path of "
-                  f"{printed(summary['reference'])}", soft_wrap=True)  # fmt: skip
-        for mode in summary["modes"]:
-            for table in (model_table(summary, mode, extent), distance_table(summary, mode, extent),
-                          *link_tables(summary, mode)):  # fmt: skip
-                print_table(out, table)
-
-    print_results(summary, show, as_json=request.json)
-    try:
+        console = PlainConsole(stderr=True)
+        for geometry in Geometry:
+            if geometry is Geometry.LINEAR or "second-order" in models:
+                compile_kernels(geometry, console.print)
+        began = time.perf_counter()
+        task = plan_study(model, mechanism, path, path_name, request.plan)
+        requested = (
+            {"path": path_name, "modes": [mode.name for mode in modes]} | asdict(request.frames) | asdict(options)
+        )
+        requested |= {"method": options.method.name, "method_parameters": options.method.values}
+        study = VerificationStudy(task, modes, models, options, command_provenance(model, requested), model.study.error)
+        with counting(console) as report:
+            verification = study.run(on_progress=report)
+        summary = verification.to_dict()
+        data = verification.data
         if data is not None:
-            write_drawn(data, folder, request.drawn)
-            if not request.json:
-                print_location(began, "numbers", folder.path, request.drawn)
-    finally:
-        for mode, by_model in verification.runs.items():
-            for name, runs in by_model.items():
-                if runs.failure:
-                    console.print(f'error: mode "{mode}", {name}: {runs.failure}', soft_wrap=True)
-    return exit_code(verification.complete, interrupted=verification.interrupted)
+            verification.save_in(folder)
+
+        def show(out: PlainConsole) -> None:
+            span, extent = SPAN_WORDS[ErrorSpan(summary["error"])], path_extent(data)
+            out.print_lines(f"{summary['mechanism']}: RMS tracking error {span}, and distances from the path of "
+                      f"{printed(summary['reference'])}")  # fmt: skip
+            for mode in summary["modes"]:
+                for table in (model_table(summary, mode, extent), distance_table(summary, mode, extent),
+                              *link_tables(summary, mode)):  # fmt: skip
+                    print_table(out, table)
+
+        print_results(summary, show, as_json=request.json)
+        try:
+            if data is not None:
+                write_drawn(data, folder, request.drawn)
+                print_location(began, "numbers", folder.path, request.drawn, as_json=request.json)
+        finally:
+            for mode, by_model in verification.runs.items():
+                for name, runs in by_model.items():
+                    if runs.failure:
+                        console.print_lines(f'error: mode "{mode}", {name}: {runs.failure}')
+        return exit_code(verification.complete, interrupted=verification.interrupted)
 
 
 def _options(request: VerifyRequest) -> VerificationOptions:

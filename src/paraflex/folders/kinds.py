@@ -8,7 +8,7 @@ from typing import Any
 
 from paraflex.errors import InputError
 
-# Kinds of folders, as their manifests name them.
+# Kinds of folders that are named in several places, as their manifests name them.
 RUN = "run"
 VERIFICATION = "verification"
 COMPARISON = "comparison of methods"
@@ -16,9 +16,6 @@ LAW_COMPARISON = "comparison of control laws"
 SENSITIVITY = "sensitivity"
 RUN_COMPARISON = "comparison of runs"
 STUDY_OF_RUNS = "study of many runs"
-LINEAR_MODELS = "study of linear models"
-EQUILIBRIA = "study of equilibria"
-REDUCED_MODELS = "study of reduced models"
 
 
 @dataclass(frozen=True)
@@ -121,7 +118,7 @@ RESULT_KINDS: dict[str, ResultKind] = {kind.name: kind for kind in (
     ResultKind("sensitivity", SENSITIVITY, ("sensitivity.json", "sensitivity.csv", "sensitivity.parquet"),
                "sensitivity.json", marks={"parameters": ..., "units": ..., "runs": ...},
                figures=("sensitivity",)),
-    ResultKind("linear", LINEAR_MODELS, ("linear.json", "linear.nc"), "linear.nc", "linear_dataset", None,
+    ResultKind("linear", "study of linear models", ("linear.json", "linear.nc"), "linear.nc", "linear_dataset", None,
                "linear.linear_page", figures=("linear",), refusals={
         "motion": ("these are linear models, not a run",
                    "their report.html shows mode shapes in motion, paraflex plot draws mode_shapes"),
@@ -129,11 +126,11 @@ RESULT_KINDS: dict[str, ResultKind] = {kind.name: kind for kind in (
                   'export them as "mat" or "netcdf"; linear.json has poles and zeros'),
     },
                drawings=("mode_shapes",)),
-    ResultKind("statics", EQUILIBRIA, ("statics.json", "statics.nc"), "statics.nc", "statics_dataset",
+    ResultKind("statics", "study of equilibria", ("statics.json", "statics.nc"), "statics.nc", "statics_dataset",
                ("step", "steps"), "statics.statics_page", figures=("equilibria",), refusals={"motion": _NOTHING_MOVES},
                drawings=("deformed_shapes", "buckling_shapes")),
-    ResultKind("reduction", REDUCED_MODELS, ("reduced.json", "reduced.nc"), "reduced.nc", "reduction_dataset",
-               ("frequency", "frequencies"), "reduction.reduction_page", figures=("reduction",),
+    ResultKind("reduction", "study of reduced models", ("reduced.json", "reduced.nc"), "reduced.nc",
+               "reduction_dataset", ("frequency", "frequencies"), "reduction.reduction_page", figures=("reduction",),
                refusals={"motion": _NOTHING_MOVES}),
     ResultKind("motion", RUN, ("summary.json", "results.nc"), "results.nc", "motion_dataset",
                page="motion.motion_page", figures=("run_motion", "motion", *_RUN_FIGURES),

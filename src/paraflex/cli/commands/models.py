@@ -3,27 +3,19 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Annotated, ClassVar
+from typing import ClassVar
 
-from typer import Argument, Option
-
-from paraflex.cli.commands.options import (
-    SECONDS,
-    AssemblyOption,
-    FilesChoice,
-    Json,
-    ModelChoice,
-    PathOption,
-)
+from paraflex.cli.commands.options import FilesChoice, ModelChoice, assembly_option, json_switch, path_option
+from paraflex.cli.commands.requests import argument, option, repeatable, switch
 
 
 @dataclass(frozen=True)
 class LibraryChoice(ModelChoice):
     """Choice of a model, or of the whole library."""
 
-    source: Annotated[
-        str | None, Argument(metavar="NAME|FILE", help="A library mechanism or a TOML file. Default: list the library.")
-    ] = None
+    source: str | None = argument(
+        "NAME|FILE", "A library mechanism or a TOML file. Default: list the library.", default=None
+    )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -31,18 +23,13 @@ class InfoRequest:
     """Options of `paraflex info`."""
 
     model: LibraryChoice = field(default_factory=LibraryChoice)
-    assembly: AssemblyOption = None
-    path: PathOption = None
-    at: Annotated[
-        float | None,
-        Option(
-            metavar="S", parser=SECONDS, help="Time of the pose, on the path or by prescribed angles, for frequencies."
-        ),
-    ] = None
-    balanced: Annotated[
-        bool, Option("--balanced", help="Frequencies about static equilibrium with motors held; else undeformed.")
-    ] = False
-    json: Json = False
+    assembly: str | None = assembly_option()
+    path: str | None = path_option()
+    at: float | None = option(
+        "--at S", "Time of the pose, on the path or by prescribed angles, for frequencies.", unit="s"
+    )
+    balanced: bool = switch("--balanced", "Frequencies about static equilibrium with motors held; else undeformed.")
+    json: bool = json_switch()
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -50,18 +37,14 @@ class DrawRequest:
     """Options of `paraflex draw`."""
 
     model: ModelChoice = field(default_factory=ModelChoice)
-    assembly: AssemblyOption = None
-    path: PathOption = None
-    output: Annotated[
-        str | None,
-        Option("--output", "--out", metavar="FILE", help="FILE.html, .svg, .png or .pdf. Default: a temporary page."),
-    ] = None
-    theme: Annotated[str, Option(metavar="light|dark", help="Colours.")] = "light"
-    open: Annotated[
-        bool | None,
-        Option("--open/--no-open", help="Show it in a browser, or not. Default: without --output, at a screen."),
-    ] = None
-    force: Annotated[bool, Option("--force", help="Overwrite an existing file.")] = False
+    assembly: str | None = assembly_option()
+    path: str | None = path_option()
+    output: str | None = option("--output --out FILE", "FILE.html, .svg, .png or .pdf. Default: a temporary page.")
+    theme: str = option("--theme light|dark", "Colours.", default="light")
+    open: bool | None = switch(
+        "--open/--no-open", "Show it in a browser, or not. Default: without --output, at a screen.", default=None
+    )
+    force: bool = switch("--force", "Overwrite an existing file.")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -69,8 +52,8 @@ class ModesRequest:
     """Options of `paraflex modes`."""
 
     model: ModelChoice = field(default_factory=ModelChoice)
-    path: PathOption = None
-    json: Json = False
+    path: str | None = path_option()
+    json: bool = json_switch()
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -78,63 +61,43 @@ class LinearRequest:
     """Options common to the commands on linear models."""
 
     model: ModelChoice = field(default_factory=ModelChoice)
-    modes: Annotated[
-        list[str],
-        Option(
-            "--mode",
-            metavar="MODE|all",
-            help="Actuation mode whose motors are inputs; repeatable, or all. Default: the study's with most motors.",
-        ),
-    ] = field(default_factory=list)
-    pose: Annotated[
-        str | None,
-        Option(
-            metavar="NAME|start|X,Y",
-            help="Pose at rest: an assembly, the file's [start], or the end-effector's position. "
-            "Default: the model's start.",
-        ),
-    ] = None
-    balanced: Annotated[
-        bool,
-        Option("--balanced", help="Use the static equilibrium near the pose, the mode's motors held; else the pose."),
-    ] = False
-    at: Annotated[
-        float | None,
-        Option(
-            metavar="S",
-            parser=SECONDS,
-            help="Time in the planned motion, or in the run of a model without a path or of results.",
-        ),
-    ] = None
+    modes: list[str] = repeatable(
+        "--mode MODE|all",
+        "Actuation mode whose motors are inputs; repeatable, or all. Default: the study's with most motors.",
+    )
+    pose: str | None = option(
+        "--pose NAME|start|X,Y",
+        "Pose at rest: an assembly, the file's [start], or the end-effector's position. Default: the model's start.",
+    )
+    balanced: bool = switch(
+        "--balanced", "Use the static equilibrium near the pose, the mode's motors held; else the pose."
+    )
+    at: float | None = option(
+        "--at S", "Time in the planned motion, or in the run of a model without a path or of results.", unit="s"
+    )
     along: ClassVar[int | None] = None
-    path: PathOption = None
-    assembly: AssemblyOption = None
-    forces: Annotated[
-        list[str],
-        Option(
-            "--force-at", metavar="BODY.POINT", help="Point whose forces along x and y are also inputs; repeatable."
-        ),
-    ] = field(default_factory=list)
-    coordinates: Annotated[
-        str,
-        Option(
-            metavar="motors|task", help="First states: angles of the motors' joints, or the end-effector's position."
-        ),
-    ] = "motors"
-    prescribed: Annotated[
-        list[str],
-        Option("--prescribed", metavar="NAME", help="Prescribed motion whose acceleration is an input; repeatable."),
-    ] = field(default_factory=list)
+    path: str | None = path_option()
+    assembly: str | None = assembly_option()
+    forces: list[str] = repeatable(
+        "--force-at BODY.POINT", "Point whose forces along x and y are also inputs; repeatable."
+    )
+    coordinates: str = option(
+        "--coordinates motors|task",
+        "First states: angles of the motors' joints, or the end-effector's position.",
+        default="motors",
+    )
+    prescribed: list[str] = repeatable(
+        "--prescribed NAME", "Prescribed motion whose acceleration is an input; repeatable."
+    )
 
 
 @dataclass(frozen=True, kw_only=True)
 class LineariseRequest(LinearRequest):
     """Options of `paraflex linearise`."""
 
-    along: Annotated[  # type: ignore[misc]
-        int | None,
-        Option(metavar="N", help="Number of times in the motion at which poles are also computed, as branches."),
-    ] = None
+    along: int | None = option(  # type: ignore[misc]
+        "--along N", "Number of times in the motion at which poles are also computed, as branches."
+    )
     files: FilesChoice = field(default_factory=FilesChoice)
 
 
@@ -142,27 +105,19 @@ class LineariseRequest(LinearRequest):
 class ReduceRequest(LinearRequest):
     """Options of `paraflex reduce`."""
 
-    states: Annotated[
-        int | None, Option(metavar="N", help="Number of states of the reduced models. Default: 16, or all if fewer.")
-    ] = None
-    methods: Annotated[
-        list[str],
-        Option(
-            "--method",
-            metavar="NAME",
-            help="craig-bampton, rubin, modal or balanced (of damped models); repeatable. Default: first and third.",
-        ),
-    ] = field(default_factory=list)
-    until: Annotated[float, Option(metavar="HZ", help="Highest frequency [Hz].")] = 40.0
-    error: Annotated[float, Option(metavar="PART", help="Error that determines the states needed.")] = 0.01
-    along: Annotated[  # type: ignore[misc]
-        int | None,
-        Option(metavar="N", help="Number of poses along the path at which the basis of one pose is also tested."),
-    ] = None
-    basis: Annotated[
-        str | None,
-        Option(metavar="NAME|start|X,Y", help="The pose whose basis is used along the path. Default: its first pose."),
-    ] = None
+    states: int | None = option("--states N", "Number of states of the reduced models. Default: 16, or all if fewer.")
+    methods: list[str] = repeatable(
+        "--method NAME",
+        "craig-bampton, rubin, modal or balanced (of damped models); repeatable. Default: first and third.",
+    )
+    until: float = option("--until HZ", "Highest frequency [Hz].", default=40.0)
+    error: float = option("--error PART", "Error that determines the states needed.", default=0.01)
+    along: int | None = option(  # type: ignore[misc]
+        "--along N", "Number of poses along the path at which the basis of one pose is also tested."
+    )
+    basis: str | None = option(
+        "--basis NAME|start|X,Y", "The pose whose basis is used along the path. Default: its first pose."
+    )
     files: FilesChoice = field(default_factory=FilesChoice)
 
 
@@ -171,49 +126,25 @@ class StaticsRequest:
     """Options of `paraflex statics`; those that are not given are taken from [statics] of the model's file."""
 
     model: ModelChoice = field(default_factory=ModelChoice)
-    loads: Annotated[
-        list[str],
-        Option(
-            "--load",
-            metavar="NAME=VALUE",
-            help='Force or torque at a joint or at a point\'s coordinate: "stage.T.x=10.5 N"; repeatable.',
-        ),
-    ] = field(default_factory=list)
-    torques: Annotated[
-        list[str], Option("--torque", metavar="MOTOR=VALUE", help="Torque or force of a motor; repeatable.")
-    ] = field(default_factory=list)
-    moved: Annotated[
-        list[str],
-        Option(
-            "--move",
-            metavar="NAME=VALUE",
-            help='Travel of a joint or of a point\'s coordinate from the start: "stage.T.x=10 mm"; repeatable.',
-        ),
-    ] = field(default_factory=list)
-    held: Annotated[
-        list[str] | None,
-        Option(
-            "--hold",
-            metavar="NAME|none",
-            help="Joint or point's coordinate held fixed; repeatable. Default: joints of motors without --torque.",
-        ),
-    ] = None
-    steps: Annotated[
-        int | None, Option(metavar="N", help="Number of equal steps of all loads and travels. Default: 10.")
-    ] = None
-    stiffness: Annotated[
-        list[str] | None,
-        Option(
-            "--stiffness",
-            metavar="NAME",
-            help="Coordinate whose stiffness is computed; repeatable. Default: those loaded or moved, "
-            "else the end-effector's.",
-        ),
-    ] = None
-    buckling: Annotated[
-        int | None, Option(metavar="N", help="Number of buckling factors about every equilibrium. Default: 1.")
-    ] = None
-    assembly: AssemblyOption = None
+    loads: list[str] = repeatable(
+        "--load NAME=VALUE", 'Force or torque at a joint or at a point\'s coordinate: "stage.T.x=10.5 N"; repeatable.'
+    )
+    torques: list[str] = repeatable("--torque MOTOR=VALUE", "Torque or force of a motor; repeatable.")
+    moved: list[str] = repeatable(
+        "--move NAME=VALUE",
+        'Travel of a joint or of a point\'s coordinate from the start: "stage.T.x=10 mm"; repeatable.',
+    )
+    held: list[str] | None = option(
+        "--hold NAME|none",
+        "Joint or point's coordinate held fixed; repeatable. Default: joints of motors without --torque.",
+    )
+    steps: int | None = option("--steps N", "Number of equal steps of all loads and travels. Default: 10.")
+    stiffness: list[str] | None = option(
+        "--stiffness NAME",
+        "Coordinate whose stiffness is computed; repeatable. Default: those loaded or moved, else the end-effector's.",
+    )
+    buckling: int | None = option("--buckling N", "Number of buckling factors about every equilibrium. Default: 1.")
+    assembly: str | None = assembly_option()
     files: FilesChoice = field(default_factory=FilesChoice)
 
 
@@ -221,15 +152,15 @@ class StaticsRequest:
 class MethodsRequest:
     """Options of `paraflex methods`."""
 
-    json: Json = False
+    json: bool = json_switch()
 
 
 @dataclass(frozen=True)
 class NewRequest:
     """Options of `paraflex new`."""
 
-    name: Annotated[str, Argument(metavar="NAME", help="Name of the file to write, NAME.toml.")]
-    template: Annotated[str, Option("--from", metavar="NAME", help="Library mechanism to start from.")] = "five_bar"
+    name: str = argument("NAME", "Name of the file to write, NAME.toml.")
+    template: str = option("--from NAME", "Library mechanism to start from.", default="five_bar")
 
 
 @dataclass(frozen=True)

@@ -2,68 +2,38 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Annotated, Any
+from functools import partial
+from typing import TYPE_CHECKING
 
-from typer import Argument, BadParameter, Option
-
+from paraflex.cli.commands.requests import argument, option, repeatable, switch
 from paraflex.errors import InputError
 
 if TYPE_CHECKING:
     from paraflex.campaign import Workers
 
-
-def measured(unit: str) -> Callable[[Any], float]:
-    """Return a parser of option values: a number in `unit`, or one with a unit of the same dimension."""
-
-    def number(text: Any) -> float:
-        try:
-            return float(text)
-        except ValueError:
-            from paraflex.files.fields import number_in  # not needed for the help
-
-            try:
-                return number_in(text, unit)
-            except InputError as error:
-                raise BadParameter(f"{error.problem}: {text!r}; {error.remedy}") from None
-
-    return number
-
-
-SECONDS, METRES, PER_SECOND = measured("s"), measured("m"), measured("1/s")
-
 # Model of a command for which none is named.
 DEFAULT_MODEL = "raparm_i"
 
-Json = Annotated[bool, Option("--json", help="Print JSON instead of tables.")]
-PathOption = Annotated[
-    str | None,
-    Option(
-        "--path", metavar="NAME|FILE", help="A path of the model (square, line, circle, ...) or a TOML file with one."
-    ),
-]
-ToleranceOption = Annotated[
-    float | None,
-    Option("--tol", metavar="METRES", parser=METRES, help="Tolerance. Default: the study's, else 4e-5 of the size."),
-]
-MethodOption = Annotated[str | None, Option(metavar="NAME", help="Method of integration: paraflex methods lists them.")]
-AssemblyOption = Annotated[str | None, Option(metavar="NAME", help="Assembly (configuration) of the mechanism.")]
-StudyArgument = Annotated[str, Argument(metavar="STUDY.toml", help="Study file: free parameters, their bounds, runs.")]
-OutputOption = Annotated[
-    str | None, Option("--output", "--out", metavar="DIR", help="Folder for results. Default: results/STUDY.")
-]
-ReplaceOption = Annotated[bool, Option("--force", help="Replace results of another kind that the folder holds.")]
-ReportOption = Annotated[bool, Option("--report/--no-report", help="Write report.html, or leave it out.")]
-OutsideOption = Annotated[bool, Option("--allow-outside", help="Read tables outside the model's folder that it names.")]
+# Functions that return the field of a request.
+json_switch = partial(switch, "--json", "Print JSON instead of tables.")
+path_option = partial(
+    option, "--path NAME|FILE", "A path of the model (square, line, circle, ...) or a TOML file with one."
+)
+tolerance_option = partial(option, "--tol METRES", "Tolerance. Default: the study's, else 4e-5 of the size.", unit="m")
+method_option = partial(option, "--method NAME", "Method of integration: paraflex methods lists them.")
+assembly_option = partial(option, "--assembly NAME", "Assembly (configuration) of the mechanism.")
+replace_switch = partial(switch, "--force", "Replace results of another kind that the folder holds.")
+report_switch = partial(switch, "--report/--no-report", "Write report.html, or leave it out.", default=True)
+outside_switch = partial(switch, "--allow-outside", "Read tables outside the model's folder that it names.")
 
 
 @dataclass(frozen=True)
 class DrawnChoice:
     """Choice of figures and report of results."""
 
-    figures: Annotated[bool, Option("--figures/--no-figures", help="Draw figures, or leave them out.")] = True
-    report: ReportOption = True
+    figures: bool = switch("--figures/--no-figures", "Draw figures, or leave them out.", default=True)
+    report: bool = report_switch()
 
 
 @dataclass(frozen=True)
@@ -76,18 +46,14 @@ class ModelChoice:
         Argument and option name different models.
     """
 
-    source: Annotated[
-        str | None, Argument(metavar="NAME|FILE", help=f"A library mechanism or a TOML file. Default: {DEFAULT_MODEL}.")
-    ] = None
-    mechanism: Annotated[
-        str | None, Option("--mechanism", "-m", metavar="NAME|FILE", help="The same, given as an option.")
-    ] = None
-
-    settings: Annotated[
-        list[str],
-        Option("--set", metavar="FIELD=VALUE", help='Value in place of the file\'s, "link1.length=80 mm"; repeatable.'),
-    ] = field(default_factory=list)
-    allow_outside: OutsideOption = False
+    source: str | None = argument(
+        "NAME|FILE", f"A library mechanism or a TOML file. Default: {DEFAULT_MODEL}.", default=None
+    )
+    mechanism: str | None = option("--mechanism -m NAME|FILE", "The same, given as an option.")
+    settings: list[str] = repeatable(
+        "--set FIELD=VALUE", 'Value in place of the file\'s, "link1.length=80 mm"; repeatable.'
+    )
+    allow_outside: bool = outside_switch()
 
     def __post_init__(self) -> None:
         if self.source is not None and self.mechanism is not None and self.source != self.mechanism:
@@ -111,56 +77,44 @@ class ModelChoice:
 class PlanChoice:
     """Options passed to `Model.plan`; None takes the model's value."""
 
-    duration: Annotated[float | None, Option(metavar="S", parser=SECONDS, help="Duration including dwell.")] = None
-    samples: Annotated[int | None, Option(metavar="N", help="Number of samples.")] = None
-    assembly: AssemblyOption = None
+    duration: float | None = option("--duration S", "Duration including dwell.", unit="s")
+    samples: int | None = option("--samples N", "Number of samples.")
+    assembly: str | None = assembly_option()
 
 
 @dataclass(frozen=True)
 class FramesChoice:
     """Choice of frames and curvature of all beams; None takes the model's."""
 
-    reference: Annotated[
-        str | None,
-        Option(metavar="pinned|cantilever|free", help="How frames are fixed to beams. Default: the model's."),
-    ] = None
-    curvature: Annotated[
-        str | None,
-        Option(metavar="separate|shared", help="Curvature of beams at lumped inertias. Default: the model's."),
-    ] = None
+    reference: str | None = option(
+        "--reference pinned|cantilever|free", "How frames are fixed to beams. Default: the model's."
+    )
+    curvature: str | None = option(
+        "--curvature separate|shared", "Curvature of beams at lumped inertias. Default: the model's."
+    )
 
 
 @dataclass(frozen=True)
 class FilesChoice:
     """Choice of files and output of one dataset; without a folder no files are written."""
 
-    out: Annotated[
-        str | None,
-        Option("--out", "--output", metavar="DIR", help="Folder for data, their summary as JSON, figures and report."),
-    ] = None
-    force: ReplaceOption = False
+    out: str | None = option("--out --output DIR", "Folder for data, their summary as JSON, figures and report.")
+    force: bool = replace_switch()
     drawn: DrawnChoice = field(default_factory=DrawnChoice)
-    json: Json = False
+    json: bool = json_switch()
 
 
 @dataclass(frozen=True)
 class WorkersChoice:
     """Choice of the workers that compute the runs of a study."""
 
-    engine: Annotated[
-        str, Option("--engine", metavar="threads|processes|dask", help="Engine that computes; results are the same.")
-    ] = "threads"
-    workers: Annotated[
-        int | None, Option("--workers", metavar="N", help="Number of workers. Default: one per processor.")
-    ] = None
-    cluster: Annotated[
-        str | None,
-        Option(
-            "--cluster",
-            metavar="ADDRESS",
-            help="Address of a Dask scheduler, tcp://host:8786. Default: one on this machine.",
-        ),
-    ] = None
+    engine: str = option(
+        "--engine threads|processes|dask", "Engine that computes; results are the same.", default="threads"
+    )
+    workers: int | None = option("--workers N", "Number of workers. Default: one per processor.")
+    cluster: str | None = option(
+        "--cluster ADDRESS", "Address of a Dask scheduler, tcp://host:8786. Default: one on this machine."
+    )
 
     @property
     def chosen(self) -> Workers:

@@ -1,4 +1,4 @@
-"""Requests: dataclasses whose fields are options of a command, each with its `typer.Option` or `typer.Argument`.
+"""Requests: dataclasses whose fields are options of a command.
 
 The shell sees an option for each field. A field that is itself a request holds options that several commands share;
 its fields are listed in its place.
@@ -9,12 +9,69 @@ from __future__ import annotations
 import inspect
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import MISSING, fields, is_dataclass
-from typing import Any, get_type_hints
+from dataclasses import MISSING, Field, field, fields, is_dataclass
+from functools import partial
+from typing import Annotated, Any, get_type_hints
 
 import typer
 
 from paraflex.errors import InputError
+
+
+def option(names: str, meaning: str, *, default: Any = None, unit: str = "") -> Any:
+    """Return a field of a request that is an option with a value.
+
+    Parameters
+    ----------
+    names : str
+        Flag of the option, another one with the same meaning if there is one, and name of the value, as the help shows
+        them: "--tol METRES", "--output --out DIR".
+    meaning : str
+        Help of the option.
+    default : any
+        Value of an option that is not given; [] for one that may be repeated.
+    unit : str
+        SI unit of a quantity, which may be given in other units; empty for other values.
+    """
+    *known, metavar = names.split()
+    info = typer.Option(*known, metavar=metavar, help=meaning, parser=_measured(unit) if unit else None)
+    return _shown(info, default, known[0])
+
+
+# Returns a field with the list of all values of an option.
+repeatable = partial(option, default=[])
+
+
+def switch(flag: str, meaning: str, *, default: bool | None = False) -> Any:
+    """Return a field of a request that is an option without a value: "--json", or "--report/--no-report"."""
+    return _shown(typer.Option(flag, help=meaning), default, flag.partition("/")[0])
+
+
+def argument(metavar: str, meaning: str, *, default: Any = MISSING) -> Any:
+    """Return a field of a request that is an argument of the command; by default it is required."""
+    return _shown(typer.Argument(metavar=metavar, help=meaning), default)
+
+
+def _shown(info: Any, default: Any, flag: str = "") -> Any:
+    value: Any = {"default_factory": list} if default == [] else {"default": default}
+    return field(**value, metadata={"shell": info, "flag": flag})
+
+
+def _measured(unit: str) -> Callable[[Any], float]:
+    """Return a parser of option values: a number in `unit`, or one with a unit of the same dimension."""
+
+    def number(text: Any) -> float:
+        try:
+            return float(text)
+        except ValueError:
+            from paraflex.files.fields import number_in  # not needed for the help
+
+            try:
+                return number_in(text, unit)
+            except InputError as error:
+                raise typer.BadParameter(f"{error.problem}: {text!r}; {error.remedy}") from None
+
+    return number
 
 
 def with_options(request: type, answer: Callable[[Any], int | None]) -> Callable[..., None]:
@@ -23,18 +80,14 @@ def with_options(request: type, answer: Callable[[Any], int | None]) -> Callable
     def called(**given: Any) -> None:
         raise typer.Exit(answer(filled(request, given)) or 0)
 
-    called.__signature__ = inspect.Signature([*_parameters(request)])  # type: ignore[attr-defined]
+    called.__signature__ = inspect.Signature([_parameter(*each) for each in _options(request)])  # type: ignore[attr-defined]
     called.__annotations__ = {}
     return called
 
 
 def flags(request: object) -> dict[str, str]:
     """Return the flag of every option of a request by its field: {"tolerance": "--tol"}."""
-    return {
-        one.name: _flag(one)
-        for one in _parameters(type(request))
-        if isinstance(one.annotation.__metadata__[0], typer.models.OptionInfo)
-    }
+    return {one.name: one.metadata["flag"] for one, _ in _options(type(request)) if one.metadata["flag"]}
 
 
 @contextmanager
@@ -55,18 +108,23 @@ def conflict(problem: str, flag: str, value: object) -> InputError:
     return InputError(problem, field=flag, value=value, remedy="leave one of them out")
 
 
-def _parameters(request: Any) -> Iterator[inspect.Parameter]:
-    """Yield the parameters of a request in order, with the fields of nested requests in their place."""
-    kinds = get_type_hints(request, include_extras=True)
+def _options(request: Any) -> Iterator[tuple[Field[Any], Any]]:
+    """Yield the options of a request and their types in order, with those of nested requests in their place."""
+    kinds = get_type_hints(request)
     for one in fields(request):
         if is_dataclass(kinds[one.name]):
-            yield from _parameters(kinds[one.name])
-            continue
-        default = one.default
-        if default is MISSING:
-            # None stands for a default made by a factory.
-            default = inspect.Parameter.empty if one.default_factory is MISSING else None
-        yield inspect.Parameter(one.name, inspect.Parameter.KEYWORD_ONLY, default=default, annotation=kinds[one.name])
+            yield from _options(kinds[one.name])
+        else:
+            yield one, kinds[one.name]
+
+
+def _parameter(one: Field[Any], kind: Any) -> inspect.Parameter:
+    # None stands for a default made by a factory.
+    default = None if one.default_factory is not MISSING else one.default
+    return inspect.Parameter(
+        one.name, inspect.Parameter.KEYWORD_ONLY, annotation=Annotated[kind, one.metadata["shell"]],
+        default=inspect.Parameter.empty if default is MISSING else default,
+    )  # fmt: skip
 
 
 def filled(request: Any, given: dict[str, Any]) -> Any:
@@ -77,10 +135,3 @@ def filled(request: Any, given: dict[str, Any]) -> Any:
         for one in fields(request)
     }
     return request(**{name: value for name, value in values.items() if value is not None})
-
-
-def _flag(one: inspect.Parameter) -> str:
-    info = one.annotation.__metadata__[0]
-    # Typer stores the first name of an option as its default.
-    named = [str(name) for name in (info.default, *(info.param_decls or ())) if str(name).startswith("--")]
-    return named[0].partition("/")[0] if named else f"--{one.name.replace('_', '-')}"

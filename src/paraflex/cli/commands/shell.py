@@ -11,21 +11,7 @@ from typing import Any, NamedTuple
 
 import typer
 
-from paraflex.cli.commands.control import CompareLawsRequest
-from paraflex.cli.commands.models import (
-    DrawRequest,
-    InfoRequest,
-    LineariseRequest,
-    MethodsRequest,
-    ModesRequest,
-    NewRequest,
-    ReduceRequest,
-    SchemaRequest,
-    StaticsRequest,
-)
-from paraflex.cli.commands.results import AnimateRequest, CompareRequest, ExportRequest, PlotRequest, ReportRequest
-from paraflex.cli.commands.runs import CompareMethodsRequest, RunRequest, VerifyRequest
-from paraflex.cli.commands.studies import IndicesRequest, SearchRequest, SensitivityRequest, SweepRequest
+from paraflex.cli.commands import models, results, runs, studies
 from paraflex.cli.signals import exit_code, is_taken, raised
 
 # Messages after an interruption, for studies of many runs and for other commands.
@@ -45,7 +31,7 @@ class ListedCommand(NamedTuple):
     help: str
 
     def answer(self, request: Any) -> int | None:
-        """Carry out a request; return the exit code."""
+        """Carry out a request; return the exit code, None for that of success."""
         module, _, function = self.function.partition(".")
         do = getattr(import_module(f"paraflex.cli.{module}"), function)
         try:
@@ -71,79 +57,79 @@ def _outside(request: Any) -> AbstractContextManager[None]:
 # Groups of commands by name, with their help.
 GROUPS = {"control": "Sampled controllers of a model."}
 # Requests of studies that store every run, so that they can be continued.
-_STUDIES = (SweepRequest, SearchRequest, IndicesRequest)
+_STUDIES = (studies.SweepRequest, studies.SearchRequest, studies.IndicesRequest)
 # In the order of `paraflex --help`.
 COMMANDS = (
-    ListedCommand("run", RunRequest, "run.run_command", """
+    ListedCommand("run", runs.RunRequest, "run.run_command", """
         Simulate paths in several actuation modes, or a model without a path on its own.
 
         Writes report.html, summary.json, results.nc and figures/."""),
-    ListedCommand("verify", VerifyRequest, "verify.verify_command", """
+    ListedCommand("verify", runs.VerifyRequest, "verify.verify_command", """
         Run a mechanism at every fidelity and in other engines.
 
         Writes report.html, verify.json, verify.nc and figures/."""),
-    ListedCommand("report", ReportRequest, "report.report_command", """
+    ListedCommand("report", results.ReportRequest, "report.report_command", """
         Write the report of stored results: one HTML file that needs no network."""),
-    ListedCommand("compare-methods", CompareMethodsRequest, "compare_methods.compare_methods_command", """
+    ListedCommand("compare-methods", runs.CompareMethodsRequest, "compare_methods.compare_methods_command", """
         Time every method of integration against its error; write compare-methods.json and figures/."""),
-    ListedCommand("control compare", CompareLawsRequest, "control.compare_laws_command", """
+    ListedCommand("control compare", runs.CompareLawsRequest, "control.compare_laws_command", """
         Run the controllers of a model, and the open loop, in several modes: errors, vibration, torques, energy.
 
         Writes laws.csv, laws.json, laws.nc and figures/. Laws that cannot run in a mode are listed with reasons."""),
-    ListedCommand("sensitivity", SensitivityRequest, "sensitivity.sensitivity_command", """
+    ListedCommand("sensitivity", studies.SensitivityRequest, "sensitivity.sensitivity_command", """
         Differentiate the metrics of runs; write sensitivity.json, a table and figures/."""),
-    ListedCommand("sweep", SweepRequest, "sweep.sweep_command", """
+    ListedCommand("sweep", studies.SweepRequest, "sweep.sweep_command", """
         Run a mechanism thousands of times with varied parameters; the same command continues an interrupted study.
 
         Writes report.html, results.parquet and summary.json, and trajectories/ if the study requests it."""),
-    ListedCommand("optimise", SearchRequest, "optimise.optimise_command", """
+    ListedCommand("optimise", studies.SearchRequest, "search.optimise_command", """
         Search for the design with the smallest metrics; the same command continues an interrupted study.
 
         Writes result.json, best.toml, results.parquet and figures/."""),
-    ListedCommand("identify", SearchRequest, "identify.identify_command", """
+    ListedCommand("identify", studies.SearchRequest, "search.identify_command", """
         Search for the parameters that reproduce given metrics; the same command continues an interrupted study.
 
         Writes result.json, best.toml, results.parquet and figures/."""),
-    ListedCommand("indices", IndicesRequest, "indices.indices_command", """
+    ListedCommand("indices", studies.IndicesRequest, "sweep.indices_command", """
         Show which parameters metrics depend on: first-order and total Sobol indices over their ranges.
 
         Writes indices.json, indices.parquet, results.parquet and figures/."""),
-    ListedCommand("compare", CompareRequest, "compare.compare_command", """
+    ListedCommand("compare", results.CompareRequest, "compare.compare_command", """
         Compare two runs: numbers, settings and motions that differ.
 
         With --out it writes compare.json and figures/ with the curves of both."""),
-    ListedCommand("animate", AnimateRequest, "animate.animate_command", """
+    ListedCommand("animate", results.AnimateRequest, "animate.animate_command", """
         Make a film of a run: mp4, gif, animated svg, or pictures."""),
-    ListedCommand("plot", PlotRequest, "plot.plot_command", """
+    ListedCommand("plot", results.PlotRequest, "plot.plot_command", """
         Draw figures of any results for print: a run's, a verification's, a comparison's, a study's."""),
-    ListedCommand("export", ExportRequest, "export.export_command", """
+    ListedCommand("export", results.ExportRequest, "export.export_command", """
         Write results for other programs: tables as CSV or Parquet, a struct for MATLAB, netCDF."""),
-    ListedCommand("modes", ModesRequest, "modes.modes_command", """
+    ListedCommand("modes", models.ModesRequest, "modes.modes_command", """
         List the actuation modes and how well each can drive the path."""),
-    ListedCommand("linearise", LineariseRequest, "linearise.linearise_command", """
+    ListedCommand("linearise", models.LineariseRequest, "linear.linearise_command", """
         Linear models at a pose or along a motion: frequencies and damping, poles, zeros, motors held and free.
 
         With --out it writes linear.nc, linear.json, figures/, and report.html with the mode shapes in motion."""),
-    ListedCommand("reduce", ReduceRequest, "reduce.reduce_command", """
+    ListedCommand("reduce", models.ReduceRequest, "linear.reduce_command", """
         Linear models of few states: how many are needed, frequencies, errors and responses beside the full model.
 
         With --out it writes reduced.nc, reduced.json and figures/."""),
-    ListedCommand("statics", StaticsRequest, "statics.statics_command", """
+    ListedCommand("statics", models.StaticsRequest, "statics.statics_command", """
         Equilibria under loads and travel in steps, past limit points: forces, stiffness, buckling, frequencies.
 
         With --out it writes statics.nc, statics.json and figures/."""),
-    ListedCommand("methods", MethodsRequest, "methods.methods_command", """
+    ListedCommand("methods", models.MethodsRequest, "methods.methods_command", """
         List the methods of integration, their options and their treatments of the constraints."""),
-    ListedCommand("info", InfoRequest, "inspect.info_command", """
+    ListedCommand("info", models.InfoRequest, "inspect.info_command", """
         Describe a mechanism and its study, and judge them: sound, doubtful or wrong, each reason with its remedy.
 
         Exit code 1 if it is wrong. Without a name: list of the library."""),
-    ListedCommand("draw", DrawRequest, "draw.draw_command", """
+    ListedCommand("draw", models.DrawRequest, "draw.draw_command", """
         Draw a mechanism before anything runs: bodies, joints by kind, motors, springs, loads, path, and their names.
 
         Loops that do not close are drawn as given, open joints marked."""),
-    ListedCommand("new", NewRequest, "create.new_command", """
+    ListedCommand("new", models.NewRequest, "create.new_command", """
         Write a commented model file to edit."""),
-    ListedCommand("schema", SchemaRequest, "create.schema_command", """
+    ListedCommand("schema", models.SchemaRequest, "create.schema_command", """
         Print the JSON Schema of model files, for editors to complete and check them."""),
 )  # fmt: skip

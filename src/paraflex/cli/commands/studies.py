@@ -4,28 +4,24 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated
-
-from typer import Argument, Option
 
 from paraflex.cli.commands.options import (
-    Json,
-    OutputOption,
-    OutsideOption,
-    ReplaceOption,
-    ReportOption,
-    StudyArgument,
     WorkersChoice,
+    json_switch,
+    outside_switch,
+    replace_switch,
+    report_switch,
 )
+from paraflex.cli.commands.requests import argument, option, repeatable
 
 
 @dataclass(frozen=True, kw_only=True)
 class StudyRequest:
     """Options common to the commands on study files."""
 
-    study: StudyArgument
-    output: OutputOption = None
-    allow_outside: OutsideOption = False
+    study: str = argument("STUDY.toml", "Study file: free parameters, their bounds, runs.")
+    output: str | None = option("--output --out DIR", "Folder for results. Default: results/STUDY.")
+    allow_outside: bool = outside_switch()
 
     @property
     def folder(self) -> Path:
@@ -37,31 +33,24 @@ class StudyRequest:
 class SensitivityRequest(StudyRequest):
     """Options of `paraflex sensitivity`."""
 
-    study: Annotated[str, Argument(metavar="STUDY.toml", help="Study file: runs, and parameters of the derivatives.")]
-    at: Annotated[
-        list[str],
-        Option(
-            metavar="NAME=VALUE", help="Value at which derivatives are taken; repeatable. Default: the mechanism's."
-        ),
-    ] = field(default_factory=list)
-    metrics: Annotated[
-        list[str], Option(metavar="NAME,...", help="Metrics to differentiate; repeatable. Default: the study's.")
-    ] = field(default_factory=list)
-    force: ReplaceOption = False
-    json: Json = False
+    study: str = argument("STUDY.toml", "Study file: runs, and parameters of the derivatives.")
+    at: list[str] = repeatable(
+        "--at NAME=VALUE", "Value at which derivatives are taken; repeatable. Default: the mechanism's."
+    )
+    metrics: list[str] = repeatable("--metrics NAME,...", "Metrics to differentiate; repeatable. Default: the study's.")
+    force: bool = replace_switch()
+    json: bool = json_switch()
 
 
 @dataclass(frozen=True, kw_only=True)
 class SweepRequest(StudyRequest):
     """Options of `paraflex sweep`."""
 
-    study: Annotated[str, Argument(metavar="STUDY.toml", help="Study file: parameters, runs, metrics.")]
+    study: str = argument("STUDY.toml", "Study file: parameters, runs, metrics.")
     workers: WorkersChoice = field(default_factory=WorkersChoice)
-    limit: Annotated[int | None, Option(metavar="N", help="Number of runs this time, rounded up to whole designs.")] = (
-        None
-    )
-    report: ReportOption = True
-    json: Json = False
+    limit: int | None = option("--limit N", "Number of runs this time, rounded up to whole designs.")
+    report: bool = report_switch()
+    json: bool = json_switch()
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -69,19 +58,15 @@ class SearchRequest(StudyRequest):
     """Options of the commands that search for a design."""
 
     workers: WorkersChoice = field(default_factory=WorkersChoice)
-    json: Json = False
+    json: bool = json_switch()
 
 
 @dataclass(frozen=True, kw_only=True)
 class IndicesRequest(StudyRequest):
     """Options of `paraflex indices`."""
 
-    metrics: Annotated[
-        list[str], Option("--metric", metavar="NAME", help="A metric; repeatable. Default: the study's.")
-    ] = field(default_factory=list)
-    samples: Annotated[
-        int | None, Option(metavar="N", help="Base samples, a power of two; (parameters + 2) N designs are run.")
-    ] = None
-    seed: Annotated[int | None, Option(metavar="N", help="Seed of the samples. Default: the study's.")] = None
+    metrics: list[str] = repeatable("--metric NAME", "A metric; repeatable. Default: the study's.")
+    samples: int | None = option("--samples N", "Base samples, a power of two; (parameters + 2) N designs are run.")
+    seed: int | None = option("--seed N", "Seed of the samples. Default: the study's.")
     workers: WorkersChoice = field(default_factory=WorkersChoice)
-    json: Json = False
+    json: bool = json_switch()
