@@ -10,12 +10,12 @@ from dataclasses import dataclass, replace
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from paraflex.arrays import Array
 from paraflex.formatting import common_unit, display_unit, labelled
 from paraflex.units import DisplayUnit
 
-Array = NDArray[np.float64]
 Mark = Literal["", "ring", "cross", "square", "dot", "triangle", "diamond", "bar"]
 
 # Numbers of colours and of dashes; the latter include the solid line.

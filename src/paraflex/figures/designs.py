@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from paraflex.arrays import Array
 from paraflex.campaign import read_tables
 from paraflex.errors import InputError, suggestion
 from paraflex.figures.charts import Axis, Chart, Curve, Mark, is_wide, look, stairs
@@ -21,8 +22,6 @@ from paraflex.figures.tables import Column, Table
 from paraflex.formatting import NO_VALUE, axis_unit, text_symbol
 from paraflex.results.metrics import JOINT, METRICS, MOTOR, metric_label
 from paraflex.seals import damaged
-
-Array = NDArray[np.float64]
 
 # Metrics by which designs are not chosen: those of the solver, and those for which smaller is not always better.
 _NOT_JUDGED = tuple(metric.name for metric in METRICS.values() if metric.of_solver or not metric.ranked)

@@ -13,7 +13,6 @@ from matplotlib.colors import to_rgba
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Polygon
-from numpy.typing import NDArray
 
 from paraflex.errors import InputError
 from paraflex.figures.shapes import figure_of
@@ -24,8 +23,6 @@ from paraflex.plots.layout import MM, page_width
 from paraflex.plots.marks import LOOKS, by_look, key_arrow, moving_marks, still_marks
 from paraflex.plots.scene import Limits, Scene, default_magnification, is_plate, run_times, scale_bar, scene, select
 from paraflex.plots.themes import Theme, theme
-
-Array = NDArray[np.float64]
 
 # Largest number of bodies whose names fit under a picture.
 _MOST_NAMED = 9

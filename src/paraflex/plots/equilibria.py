@@ -7,8 +7,8 @@ from dataclasses import replace
 import numpy as np
 import xarray as xr
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
+from paraflex.arrays import Array
 from paraflex.errors import InputError
 from paraflex.figures.equilibria import given_coordinates
 from paraflex.formatting import number
@@ -19,8 +19,6 @@ from paraflex.plots.scene import Limits, common_limits, scene
 from paraflex.plots.themes import Theme, theme
 from paraflex.results.kinds import check_kind
 from paraflex.results.statics_steps import as_samples, seen_buckling
-
-Array = NDArray[np.float64]
 
 # Largest displacement of a buckling shape, as a share of the mechanism's size.
 _SWING = 0.12

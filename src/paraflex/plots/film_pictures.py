@@ -12,6 +12,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from paraflex.arrays import Array
 from paraflex.plots.drawing import Sketch, bare, caption, draw_load_keys, draw_scale_bar, name_links
 from paraflex.plots.labels import plain
 from paraflex.plots.scene import Scene, common_limits
@@ -59,7 +60,7 @@ class Film:
         return caption(self.scenes[0]) + (f", speed × {self.speed:g}" if self.plays else "") + trail
 
     @property
-    def time(self) -> NDArray[np.float64]:
+    def time(self) -> Array:
         """Times of the run in the pictures [s]."""
         return self.scenes[0].time
 

@@ -6,11 +6,9 @@ from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from paraflex.arrays import Array
 from paraflex.plots.scene import ARROW, BLOCK, TURN, DrawnJoint, DrawnLoad, Limits, Scene
-
-Array = NDArray[np.float64]
 
 # Sizes as shares of the picture's larger side.
 PIN, TRIANGLE, RAIL, MOTOR = 0.008, 0.028, 0.02, 0.0125

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
-from numpy.typing import NDArray
 
+from paraflex.arrays import Array
 from paraflex.figures.selection import names_of, samples
 from paraflex.figures.shapes import figure_of
 from paraflex.plots.drawing import Sketch
@@ -20,8 +20,6 @@ from paraflex.plots.scene import DrawnGear, DrawnJoint, Limits, Scene, limits_of
 from paraflex.plots.style import BLACK
 from paraflex.plots.themes import theme
 from paraflex.results.outlines import figure_order
-
-Points = NDArray[np.float64]
 
 POINT_STYLE: dict[str, Any] = {"linestyle": "none", "marker": "o", "markersize": 2.5, "color": BLACK, "zorder": 3.0}
 _IN_LEGEND: dict[str, Any] = {"linestyle": "none", "marker": "^", "markerfacecolor": "none", "markeredgecolor": BLACK}
@@ -35,7 +33,7 @@ _WIDTH = 0.68
 _SAME = 1e-4
 
 
-def draw_mechanism(axes: Axes, data: xr.Dataset, clear_of: Points) -> None:
+def draw_mechanism(axes: Axes, data: xr.Dataset, clear_of: Array) -> None:
     """Draw the start pose: every link, its joints, the points that do not move, and the points' names.
 
     Parameters
@@ -93,7 +91,7 @@ def _of_shapes(run: xr.Dataset) -> Scene:
     )  # fmt: skip
 
 
-def _scene(points: Points, names: list[str], joints: tuple[DrawnJoint, ...]) -> Scene:
+def _scene(points: Array, names: list[str], joints: tuple[DrawnJoint, ...]) -> Scene:
     """Return a scene whose bodies are the figures formed by their points, at one time."""
     bodies: dict[str, list[int]] = {}
     for k, name in enumerate(names):
@@ -105,13 +103,13 @@ def _scene(points: Points, names: list[str], joints: tuple[DrawnJoint, ...]) -> 
     )  # fmt: skip
 
 
-def _sampled(outline: Points) -> Points:
+def _sampled(outline: Array) -> Array:
     """Return closely spaced points along a line (1, s, 2)."""
     share = np.linspace(0.0, 1.0, 25)[:, None]
     return np.vstack([a + share * (b - a) for a, b in pairwise(outline[0])] + [outline[0, :1]])
 
 
-def _coincident(points: Points, size: float) -> list[list[int]]:
+def _coincident(points: Array, size: float) -> list[list[int]]:
     """Return the indices of points, grouped by position."""
     groups: dict[int, list[int]] = {}
     for k, point in enumerate(points):
@@ -120,7 +118,7 @@ def _coincident(points: Points, size: float) -> list[list[int]]:
     return list(groups.values())
 
 
-def _name_points(axes: Axes, points: Points, groups: list[list[int]], names: list[str], taken: Points) -> None:
+def _name_points(axes: Axes, points: Array, groups: list[list[int]], names: list[str], taken: Array) -> None:
     """Write names beside points, each on the side with most room; coincident points share a text."""
     size = float(np.ptp(points, axis=0).max())
     angles = np.linspace(0.0, 2.0 * np.pi, 24, endpoint=False)

@@ -10,8 +10,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import FancyArrowPatch
-from numpy.typing import NDArray
 
+from paraflex.arrays import Array
 from paraflex.figures.shapes import figure_of
 from paraflex.formatting import number as number_text, printable
 from paraflex.mechanism import GROUND, Mechanism
@@ -26,8 +26,6 @@ from paraflex.plots.signs import arrow_sign, draw_arrow, joint_sign, sign_legend
 from paraflex.plots.style import journal_style
 from paraflex.plots.themes import Theme, theme
 from paraflex.results.posed import Posed
-
-Array = NDArray[np.float64]
 
 _MM_OF_POINT = 25.4 / 72.0
 # Room around the panel: left, right, below with the legend, above with the title [mm].

@@ -9,7 +9,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from paraflex.arrays import Array
 
 # Widths of a regular and of a bold letter, and height of a line, in font sizes.
 _LETTER, _BOLD, _LINE = 0.62, 0.69, 1.3

@@ -14,14 +14,13 @@ import numpy as np
 import xarray as xr
 from numpy.typing import NDArray
 
+from paraflex.arrays import Array
 from paraflex.errors import InputError, suggestion
 from paraflex.figures.selection import names_of, point_number, select_run
 from paraflex.figures.shapes import figure_of
 from paraflex.folders import RESULT_KINDS
 from paraflex.formatting import display_unit, printable, quantity
 from paraflex.results.kinds import kind_of
-
-Array = NDArray[np.float64]
 
 # Variables of joints, and their counterparts for the bodies of shape_base.
 JOINT_BASES = {"joint_position": "joint_base", "joint_direction": "joint_direction_base"}

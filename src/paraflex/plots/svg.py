@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from html import escape
 
 import numpy as np
-from numpy.typing import NDArray
 
+from paraflex.arrays import Array
 from paraflex.figures.shapes import figure_of
 from paraflex.formatting import printable
 from paraflex.mechanism import Mechanism
@@ -16,8 +16,6 @@ from paraflex.plots.marks import LOOKS, Mark, moving_marks, still_marks
 from paraflex.plots.scene import Limits, Scene, is_plate, scene
 from paraflex.plots.themes import PAGE, Theme
 from paraflex.results.drawing import assembled_data
-
-Array = NDArray[np.float64]
 
 # Distance from the chord below which points of a line are omitted [pixels].
 _STRAIGHT = 0.15

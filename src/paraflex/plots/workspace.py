@@ -8,8 +8,8 @@ import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
+from paraflex.arrays import Array
 from paraflex.plots.given import drawn
 from paraflex.plots.layout import ONE_COLUMN, finish_plane, panels
 from paraflex.plots.mechanism import draw_mechanism
@@ -36,7 +36,7 @@ def desired_path(data: xr.Dataset) -> Figure:
     return finish_plane(figure, axes)
 
 
-def _draw_direction(axes: Axes, path: NDArray[np.float64]) -> None:
+def _draw_direction(axes: Axes, path: Array) -> None:
     """Draw arrow heads along a path at one, three, five and seven eighths of its length."""
     travelled = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(path, axis=0), axis=1))])
     if travelled[-1] == 0.0:

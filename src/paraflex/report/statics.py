@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
 from paraflex.arguments import checked_arguments
+from paraflex.arrays import Array
 from paraflex.figures import equilibria
 from paraflex.figures.catalogue import page_panels
 from paraflex.figures.charts import Panel
@@ -24,8 +24,6 @@ from paraflex.results.kinds import check_kind
 from paraflex.results.statics_data import statics_summary
 from paraflex.results.statics_steps import as_samples, step_kinds
 from paraflex.results.validity import validity_line
-
-Array = NDArray[np.float64]
 
 # Duration of the animation from the first step to the last [s].
 _DURATION = 5.0
