@@ -68,7 +68,8 @@ class Page:
     figures : sequence of (str, str, str)
         Tiles of the main numbers: name, value, and the member or run they refer to.
     summary, tables, more : sequence of (str, str)
-        Headings and HTML of the sections before all charts, before those over time, and after them; see `text.sections`.
+        Headings and HTML of the sections before all charts, before those over time, and after them, as of
+        `text.sections`.
     survey : sequence of Panel
         Charts of all designs, before the tables.
     designs : Designs, optional
