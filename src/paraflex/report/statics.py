@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -11,15 +12,12 @@ import xarray as xr
 from paraflex.arguments import checked_arguments
 from paraflex.arrays import Array
 from paraflex.figures import equilibria
-from paraflex.figures.catalogue import page_panels
 from paraflex.figures.charts import Panel
 from paraflex.figures.equilibria import quantity_word, unit_of
 from paraflex.formatting import NO_VALUE, number, quantity, text_symbol
 from paraflex.report.film import NO_SHAPES, Animation, animation, frames_of
+from paraflex.report.kind_page import kind_page
 from paraflex.report.page import Page
-from paraflex.report.provenance import asked, command_line, verdict_word
-from paraflex.report.text import sections
-from paraflex.results.findings import finding_lines, verdict_of
 from paraflex.results.kinds import check_kind
 from paraflex.results.statics_data import statics_summary
 from paraflex.results.statics_steps import as_samples, step_kinds
@@ -36,34 +34,29 @@ def statics_page(data: xr.Dataset) -> Page:
     """Return the report of equilibria, a dataset from `results.statics_dataset`."""
     check_kind(data, "statics")
     data = data.transpose("step", ...)
-    summary = statics_summary(data)
-    film = _film(data)
-    return Page(
-        title=data.attrs["mechanism"],
-        kind="statics",
+    summary, page = statics_summary(data), kind_page(data)
+    return replace(
+        page,
         subtitle=_subtitle(data),
-        verdict=verdict_word(data),
-        facts=[("steps", str(summary["steps"])), ("paraflex", str(data.attrs["paraflex_version"]))],
-        command=command_line(asked(data)),
+        facts=[("steps", str(summary["steps"])), *page.facts],
         figures=_tiles(data, summary),
-        more=sections(equilibria.tables(data)),
-        panels=_panels(data),
+        panels=_panels(data, page.panels),
         time=_times(data.sizes["step"]),
         runs=("",),
-        film=film,
-        no_film="" if film else NO_SHAPES,
+        film=_film(data),
+        no_film=NO_SHAPES,
         notes=[
             *([] if summary["status"] == "complete" else [f"{summary['status']}: {summary['message']}"]),
-            *finding_lines(verdict_of(data)),
+            *page.notes,
         ],
         remarks=list(filter(None, [validity_line({"": summary["validity"]}), equilibria.no_buckling(data)])),
     )
 
 
-def _panels(data: xr.Dataset) -> list[Panel]:
+def _panels(data: xr.Dataset, along: Sequence[Panel]) -> list[Panel]:
     """Return the charts along the travel and of buckling, or else of the shape."""
     buckling = list(equilibria.buckling_chart(data))
-    panels = [*page_panels("statics", data), *([Panel("Buckling", buckling)] if buckling else [])]
+    panels = [*along, *([Panel("Buckling", buckling)] if buckling else [])]
     return panels or [Panel("Shape", [equilibria.shape_chart(data)])]
 
 

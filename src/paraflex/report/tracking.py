@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,20 +11,19 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from paraflex.arguments import checked_arguments
-from paraflex.figures.catalogue import page_panels
 from paraflex.figures.reduction import reduced_runs
 from paraflex.figures.run_motion import deflections_of, effort_axis
 from paraflex.figures.run_tables import Runs, after_table, result_table, solver_table
-from paraflex.figures.runs import thinned
 from paraflex.figures.selection import default_mode, names_of, samples
 from paraflex.findings import DONE_STATUSES
 from paraflex.formatting import number, peak, quantity
 from paraflex.report.film import NO_SHAPES, animation
+from paraflex.report.kind_page import kind_page
 from paraflex.report.loads import load_tables, load_tiles
 from paraflex.report.page import Page
-from paraflex.report.provenance import asked, command_line, common_facts, summary_beside, verdict_word
+from paraflex.report.provenance import asked, common_facts, summary_beside, verdict_word
 from paraflex.report.text import sections
-from paraflex.results.findings import finding_lines, finished, verdict_of
+from paraflex.results.findings import finished
 from paraflex.results.following import headline
 from paraflex.results.kinds import check_kind
 from paraflex.results.loads import load_figures
@@ -53,21 +53,18 @@ def tracking_page(data: xr.Dataset, failed: Mapping[str, str] | None = None) -> 
     check_kind(data, "tracking")
     data = data.transpose("mode", "time", ...)
     runs, rows = names_of(data, "mode"), Runs({"": data}, {"": list(failed or {})})
-    run = asked(data)
+    page, run = kind_page(data), asked(data)
     path = run.get("path")
     modes = f"{len(runs)} actuation modes" if len(runs) > 1 else f"actuation mode {runs[0]}"
-    moving = animation(data)
-    few = thinned(data)
     # The validity is that of complete runs only.
     whole = data.isel(mode=finished(data))
     valid = validity_line({name: validity_summary(whole.sel(mode=name)) for name in names_of(whole, "mode")})
-    return Page(
-        title=data.attrs["mechanism"],
+    return replace(
+        page,
         kind="run",
         subtitle=", ".join([f"path “{path}”", modes] if path else [modes]),
         verdict=verdict_word(data, failed or {}),
         facts=[*([("model", _model(run))] if run else []), *_after(data), *common_facts(data)],
-        command=command_line(run),
         figures=_figures(data),
         more=[
             *sections([result_table(rows), after_table(rows)]),
@@ -75,13 +72,11 @@ def tracking_page(data: xr.Dataset, failed: Mapping[str, str] | None = None) -> 
             *sections(reduced_runs(data)),
             *sections([solver_table(rows)]),
         ],
-        panels=page_panels("tracking", few),
-        time=few["time"].values,
         runs=runs,
         selected=runs.index(default_mode(data)),
-        film=moving,
-        no_film="" if moving else NO_SHAPES,
-        notes=[*_unfinished(data, failed or {}), *finding_lines(verdict_of(data))],
+        film=animation(data),
+        no_film=NO_SHAPES,
+        notes=[*_unfinished(data, failed or {}), *page.notes],
         remarks=[valid] if valid else [],
     )
 
