@@ -460,6 +460,8 @@ def test_the_front_is_of_what_no_other_design_is_better_than(results: Path) -> N
     assert {(x[i], y[i]) for i in range(80) if not worse[i]} == {(x[i], y[i]) for i in front}
     assert list(x[front]) == sorted(x[front])
     assert undominated(np.zeros(0), np.zeros(0)).size == 0
+    # A design without one of the metrics neither is on the front nor ends it.
+    assert undominated(np.array([0.0, 1.0, 2.0, np.nan]), np.array([3.0, np.nan, 1.0, 0.0])).tolist() == [0, 2]
     (figure,) = drawn(open_source(results / "sweep"), "pareto_front")
     # Thin links err, thick ones are heavy and want torque.
     assert figure.axes[0].get_xlabel().startswith("RMS tracking error")
