@@ -6,7 +6,7 @@ Numbers of a description are in SI units; what draws it converts them by `shown_
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
@@ -264,10 +264,6 @@ class Chart:
     def shown(self, run: int | None, choice: int | None) -> list[Curve]:
         """Return the curves that are shown for a selected run and a choice; None for all of them."""
         return [curve for curve in self.curves if curve.is_shown(run, choice)]
-
-    def with_curves(self, curves: Iterable[Curve]) -> Chart:
-        """Return the chart with other curves."""
-        return replace(self, curves=tuple(curves))
 
     def shown_units(self) -> ShownUnits:
         """Return the units in which the chart is drawn."""

@@ -95,7 +95,7 @@ class DesignTable:
         """Rows of the complete runs of each pair of path and mode."""
         found: dict[tuple[str, str], list[int]] = {}
         for row in np.flatnonzero(self.complete):
-            found.setdefault((str(self.path[row]), str(self.mode[row])), []).append(row)
+            found.setdefault((str(self.path[row]), str(self.mode[row])), []).append(int(row))
         return {pair: np.array(rows) for pair, rows in found.items()}
 
     @property

@@ -104,7 +104,7 @@ def joint_forces(data: xr.Dataset) -> Iterator[Chart]:
             Curve(word, values[:, j], look=look(k), run=0, choice=1 + j if several else None, stopped=stopped)
             for j in range(min(sizes.sizes["joint"], _MOST_CHOICES)) for k, (word, values) in enumerate(parts.items())
         ]  # fmt: skip
-        chart = chart.with_curves([*(curve for curve in chart.curves if curve.choice == 0), *curves])
+        chart = replace(chart, curves=[*(curve for curve in chart.curves if curve.choice == 0), *curves])
     yield replace(chart, choices=chart.choices[: 1 + _MOST_CHOICES])
 
 

@@ -12,9 +12,9 @@ import numpy as np
 import xarray as xr
 
 from paraflex.errors import InputError
-from paraflex.figures.charts import DASHED, DOTTED, Axis, Chart, Curve, Look, look
+from paraflex.figures.charts import DASHED, Axis, Chart, Curve, Look, look
 from paraflex.figures.entry import figure
-from paraflex.figures.run_motion import actual_name, effort_axis, start_mark
+from paraflex.figures.run_motion import actual_name, effort_axis, of_member, start_mark
 from paraflex.figures.runs import (
     after_motion,
     check_magnification,
@@ -217,17 +217,8 @@ def _of_directions(data: xr.Dataset, names: Sequence[str], point: str | None) ->
     directions, curves = moving_directions(data), []
     for k, direction in enumerate(directions):
         a = names_of(data, "axis").index(direction)
-        for r, stopped in enumerate(stopped_runs(data)):
-            *x, y = (each[r, :, a] for each in actual)
-            curves.append(Curve(actual_name(data, r, point), y, *x, look=look(0), run=r, shown=(r,), choice=k,
-                                stopped=stopped))  # fmt: skip
-            if x:
-                curves.append(
-                    start_mark(*(each[:1, a] for each in desired or [each[r] for each in actual]), run=r, choice=k)
-                )
-        if desired:
-            *x, y = (each[:, a] for each in desired)
-            curves.append(Curve("desired", y, *x, look=Look(dash=DOTTED), choice=k, desired=True))
+        wanted = [each[:, a] for each in desired]
+        curves += of_member(data, k, [each[..., a] for each in actual], wanted, point, wanted)
     *extents, extent = (peak(each) if len(names) > 1 else peak(ranges(each, axis=-2)) for each in desired or actual)
     word, unit, dots = axes[names[-1]]
     chart = Chart(

@@ -30,7 +30,7 @@ from paraflex.plots.layout import (
     is_narrow,
     label_outer_time,
     lay_out,
-    panel_grid,
+    panels,
 )
 from paraflex.plots.scales import LIST_LINE, list_lines, mark_powers
 from paraflex.plots.style import BLACK, COLOURS, SHADE, ZERO, journal_style, keep_flat
@@ -140,9 +140,7 @@ def print_figure(
         return _plane(rows[0][0], time, entry.curves)
     cells = [cell for row in rows for cell in row]
     columns = _columns(entry, len(cells), charts)
-    figure, axes = panel_grid(
-        len(cells), columns, width=ONE_COLUMN if len(cells) == 1 and entry.columns else TWO_COLUMNS
-    )
+    figure, axes = panels(len(cells), columns, width=ONE_COLUMN if len(cells) == 1 and entry.columns else TWO_COLUMNS)
     for k, (panel, cell) in enumerate(zip(axes.flat, cells, strict=False)):
         # Panels side by side share the names on their axes.
         named = k % columns == 0 or cell.chart.axis(None).names != cells[k - 1].chart.axis(None).names
@@ -310,7 +308,7 @@ def _set_scale(
     panel: Axes, direction: Any, axis: Axis, values: Any, unit: DisplayUnit, *, marked: bool = False
 ) -> None:
     """Set scale, limits and lines of an axis; if all of its values are `marked`, there is room beside them."""
-    set_limits = panel.set_ylim if direction == "y" else panel.set_xlim
+    set_limits = getattr(panel, f"set_{direction}lim")
     if axis.linear_below:
         _symmetrical(panel, direction, axis, unit)
     elif is_logarithmic(axis, values):
@@ -331,7 +329,7 @@ def _set_scale(
     if axis.high is not None:
         set_limits(None, unit.factor * axis.high)
     if axis.ticks:
-        (panel.set_yticks if direction == "y" else panel.set_xticks)(unit.factor * np.asarray(axis.ticks))
+        panel.set(**{f"{direction}ticks": unit.factor * np.asarray(axis.ticks)})
     if axis.zero:
         (panel.axhline if direction == "y" else panel.axvline)(0.0, **ZERO)
 
@@ -346,7 +344,7 @@ def _symmetrical(panel: Axes, direction: str, axis: Axis, unit: DisplayUnit) -> 
 
 def _plane(cell: _Cell, time: Any, most: int) -> Figure:
     """Draw the only panel of a figure, with equal scales and a margin, and a minimum size for a line or a point."""
-    figure, axes = panel_grid(1, 1, width=ONE_COLUMN)
+    figure, axes = panels(1, 1, width=ONE_COLUMN)
     panel: Axes = axes[0, 0]
     panel.set_aspect("equal")
     _draw(panel, cell, time, most)

@@ -83,19 +83,14 @@ def is_narrow(width: float = TWO_COLUMNS) -> bool:
     return page_width(width) < 0.75 * TWO_COLUMNS
 
 
-def panels(rows: int, columns: int, *, width: float = TWO_COLUMNS) -> tuple[Figure, NDArray[Any]]:
-    """Create a figure of a width [mm] and its axes (rows, columns), to be placed by `lay_out`.
+def panels(count: int, columns: int, *, width: float = TWO_COLUMNS) -> tuple[Figure, NDArray[Any]]:
+    """Create a figure of a width [mm] with `count` panels in rows of `columns`, to be placed by `lay_out`.
 
-    A width set by `column_width` takes precedence.
+    They are the first ones of `axes.flat`; the others are hidden. A width set by `column_width` takes precedence.
     """
     width = page_width(width)
     figure = Figure(figsize=(width * MM, width * MM))
-    return figure, figure.subplots(rows, columns, squeeze=False)
-
-
-def panel_grid(count: int, columns: int, *, width: float = TWO_COLUMNS) -> tuple[Figure, NDArray[Any]]:
-    """Create `count` panels in rows of `columns`, the first ones of `axes.flat`; the others are hidden."""
-    figure, axes = panels(-(-count // columns), columns, width=width)
+    axes = figure.subplots(-(-count // columns), columns, squeeze=False)
     for panel in axes.flat[count:]:
         panel.set_visible(False)
     return figure, axes
@@ -185,13 +180,6 @@ def lay_out(figure: Figure, axes: NDArray[Any], *, panel_height: float) -> Figur
     return figure
 
 
-def equal_scales_height(figure: Figure, panel: Axes) -> float:
-    """Return the height [mm] at which the only panel of a figure has equal scales on both axes and fills its width."""
-    (left, right), (bottom, top) = panel.get_xlim(), panel.get_ylim()
-    _, _, width = _columns(np.array([[panel]]), figure.get_figwidth() / MM)
-    return width * (top - bottom) / (right - left)
-
-
 def finish_plane(figure: Figure, axes: Axes) -> Figure:
     """Set the limits of the only panel, with a margin and a least size for a line or point, and lay out the figure."""
     box = axes.dataLim
@@ -201,7 +189,9 @@ def finish_plane(figure: Figure, axes: Axes) -> Figure:
     middle_x, middle_y = box.x0 + 0.5 * box.width, box.y0 + 0.5 * box.height
     axes.set_xlim(middle_x - 0.5 * width, middle_x + 0.5 * width)
     axes.set_ylim(middle_y - 0.5 * height, middle_y + 0.5 * height)
-    return lay_out(figure, np.array([[axes]]), panel_height=equal_scales_height(figure, axes))
+    # The panel has equal scales on both axes and fills the width of the figure.
+    only = np.array([[axes]])
+    return lay_out(figure, only, panel_height=_columns(only, figure_width(axes))[2] * height / width)
 
 
 def _rows(

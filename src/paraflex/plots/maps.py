@@ -50,8 +50,8 @@ def response_map(table: DesignTable, metrics: Sequence[str] | None = None) -> Fi
             remedy="vary two of them, or draw response_curves",
         )  # fmt: skip
     chosen = table.judged_by(metrics, 1)[:_MOST_METRICS]
-    shape = (len(chosen), 1) if is_narrow() else (1, len(chosen))
-    figure, axes = panels(*shape, width=ONE_COLUMN if len(chosen) == 1 else TWO_COLUMNS)
+    columns = 1 if is_narrow() else len(chosen)
+    figure, axes = panels(len(chosen), columns, width=ONE_COLUMN if len(chosen) == 1 else TWO_COLUMNS)
     for panel, metric in zip(axes.flat, chosen, strict=True):
         shown = [(series[0].column(name), *table.labelled(name)) for name in (*names[:2], metric)]
         _draw_map(panel, *(factor * values for values, _, factor in shown))

@@ -16,7 +16,7 @@ from paraflex.figures.shapes import figure_of
 from paraflex.plots.drawing import Sketch
 from paraflex.plots.labels import symbol
 from paraflex.plots.marks import still_marks
-from paraflex.plots.scene import DrawnGear, DrawnJoint, Limits, Scene, limits_of, run_times, scene
+from paraflex.plots.scene import DrawnJoint, Scene, limits_of, run_times, scene
 from paraflex.plots.style import BLACK
 from paraflex.plots.themes import theme
 from paraflex.results.outlines import figure_order
@@ -26,6 +26,9 @@ _IN_LEGEND: dict[str, Any] = {"linestyle": "none", "marker": "^", "markerfacecol
 _LOOK = replace(theme("light"), ink=BLACK, earth=BLACK, links=("#737373",))
 # Millimetres per metre, and number of samples of a run from which the travel of sliding joints is found.
 _MM, _POSES = 1e3, 61
+# Variables of a scene that are lengths.
+_LENGTHS = ("shape", "shape_base", "joint_position", "joint_base", "spring_position", "gear_radius",
+            "end_effector_desired")  # fmt: skip
 # Line width relative to that of a film.
 _WIDTH = 0.68
 
@@ -48,7 +51,7 @@ def draw_mechanism(axes: Axes, data: xr.Dataset, clear_of: Array) -> None:
     run = max((data.isel(mode=k) for k in range(data.sizes["mode"])), key=samples)
     if samples(run) == 0:
         return
-    places = 1e3 * run["point_position"].transpose("time", "point", "axis").values[: samples(run)]
+    places = _MM * run["point_position"].transpose("time", "point", "axis").values[: samples(run)]
     names = names_of(run, "point")
     start, size = places[0], float(np.ptp(places[0], axis=0).max())
     moves = np.ptp(places, axis=0).max(axis=1)
@@ -68,7 +71,7 @@ def draw_mechanism(axes: Axes, data: xr.Dataset, clear_of: Array) -> None:
     others = [group[0] for group in groups if group[0] not in joined]
     if others:
         axes.plot(*start[others].T, label="other points", **POINT_STYLE)
-    taken = np.vstack([*map(_sampled, shown.bodies.values()), *grounds, clear_of])
+    taken = np.vstack([*(_sampled(figure_of(places[:1])) for places in shown.bodies.values()), *grounds, clear_of])
     taken = taken[np.isfinite(taken).all(axis=1)]
     axes.update_datalim(np.vstack([start, taken]))
     _name_points(axes, start, groups, names, taken)
@@ -76,19 +79,8 @@ def draw_mechanism(axes: Axes, data: xr.Dataset, clear_of: Array) -> None:
 
 def _of_shapes(run: xr.Dataset) -> Scene:
     """Return the scene of the start pose in mm, with rails as long as the travel of the run."""
-    shown = scene(run, np.linspace(*run_times(run), _POSES))
-    return replace(
-        shown,
-        bodies={name: _MM * figure_of(places[:1]) for name, places in shown.bodies.items()},
-        joints=tuple(
-            replace(joint, place=_MM * joint.place, rail=None if joint.rail is None else _MM * joint.rail)
-            for joint in shown.joints
-        ),
-        springs={name: _MM * ends for name, ends in shown.springs.items()},
-        gears=tuple(DrawnGear(gear.name, tuple(_MM * line for line in gear.lines)) for gear in shown.gears),
-        anchors=tuple(_MM * place for place in shown.anchors),
-        trail=None, desired=None, loads=(), limits=Limits(*(_MM * side for side in shown.limits)),
-    )  # fmt: skip
+    in_mm = run.assign({name: _MM * run[name] for name in _LENGTHS if name in run})
+    return replace(scene(in_mm, np.linspace(*run_times(run), _POSES)), trail=None, desired=None, loads=())
 
 
 def _scene(points: Array, names: list[str], joints: tuple[DrawnJoint, ...]) -> Scene:

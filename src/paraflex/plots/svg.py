@@ -7,9 +7,10 @@ from dataclasses import dataclass
 from html import escape
 
 import numpy as np
+from numpy.typing import NDArray
 
 from paraflex.arrays import Array
-from paraflex.figures.shapes import figure_of
+from paraflex.figures.shapes import figure_of, travelled
 from paraflex.formatting import printable
 from paraflex.mechanism import Mechanism
 from paraflex.plots.marks import LOOKS, Mark, moving_marks, still_marks
@@ -41,6 +42,8 @@ class Pen:
         Colours.
     seconds : float
         Duration of the film [s]; zero (default) for a still picture.
+    keys : array of int or slice
+        Numbers of the scene's times that are shown; all by default.
     """
 
     corner: tuple[float, float]
@@ -48,10 +51,11 @@ class Pen:
     unit: float
     look: Theme
     seconds: float = 0.0
+    keys: NDArray[np.int64] | slice = slice(None)
 
     def pixels(self, places: Array) -> Array:
-        """Return positions [m] as positions on the page [pixels]."""
-        return places * [self.scale, -self.scale] + self.corner
+        """Return positions (f, ..., 2) [m] as positions on the page at the shown times [pixels]."""
+        return places[self.keys] * [self.scale, -self.scale] + self.corner
 
 
 def sketch(mechanism: Mechanism) -> str:
@@ -136,7 +140,7 @@ def _dot(places: Array, radius: float, look: str, name: str, pen: Pen) -> str:
 def _trail(places: Array, pen: Pen) -> str:
     """Return the element of the whole trail, which is uncovered over time."""
     pixels = pen.pixels(places)
-    steps = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(pixels, axis=0), axis=1))])
+    steps = travelled(pixels)
     if steps[-1] < 0.5:
         return ""
     covered = [f"{value:.1f}" for value in steps[-1] - steps]
