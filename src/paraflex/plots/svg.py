@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from html import escape
+from types import EllipsisType
 
 import numpy as np
 from numpy.typing import NDArray
@@ -42,7 +43,7 @@ class Pen:
         Colours.
     seconds : float
         Duration of the film [s]; zero (default) for a still picture.
-    keys : array of int or slice
+    keys : array of int, optional
         Numbers of the scene's times that are shown; all by default.
     """
 
@@ -51,7 +52,7 @@ class Pen:
     unit: float
     look: Theme
     seconds: float = 0.0
-    keys: NDArray[np.int64] | slice = slice(None)
+    keys: NDArray[np.int64] | EllipsisType = ...
 
     def pixels(self, places: Array) -> Array:
         """Return positions (f, ..., 2) [m] as positions on the page at the shown times [pixels]."""
