@@ -44,15 +44,13 @@ def write_film(film: Film, kind: str, file: Path, report: Report) -> None:
         _write_mp4(film, file, find_encoder(), report)
     elif kind == ".gif":
         _write_gif(film, file, report)
-    elif kind == ".png":
-        still = next(frames(film, [len(film.time) - 1]))
-        Image.fromarray(still).convert("RGB").save(file, format="PNG")
-        report(1, 1)
     else:
-        digits = max(4, len(str(len(film.time))))
-        for i, frame in enumerate(frames(film), 1):
-            Image.fromarray(frame).convert("RGB").save(file / f"frame_{i:0{digits}d}.png")
-            report(i, len(film.time))
+        count, digits = len(film.time), max(4, len(str(len(film.time))))
+        numbers = range(count) if kind == "" else [count - 1]
+        for i, frame in enumerate(frames(film, numbers), 1):
+            target = file / f"frame_{i:0{digits}d}.png" if kind == "" else file
+            Image.fromarray(frame).convert("RGB").save(target, format="PNG")
+            report(i, len(numbers))
 
 
 def find_encoder() -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Mapping
-from functools import cache, wraps
+from functools import wraps
 from inspect import signature
 from pathlib import Path
 from typing import Any, Concatenate, ParamSpec, TypeVar
@@ -37,7 +37,8 @@ def drawn(function: Callable[Concatenate[D, P], Figure]) -> Callable[Concatenate
     def draw_results(*args: Any, **kwargs: Any) -> Figure:
         data: Any = args[0] if args else kwargs.pop(first, None)
         if isinstance(data, str | os.PathLike | xr.Dataset):
-            data = _of_a_kind(data, _kinds()[function.__name__])
+            listed = ((kind, one) for kind, figures in CATALOGUE.items() for one in figures)
+            data = _of_a_kind(data, {kind: one.takes for kind, one in listed if one.name == function.__name__})
         try:
             with journal_style():
                 return take(data, *args[1:], **kwargs)
@@ -65,13 +66,3 @@ def _of_a_kind(data: Any, kinds: Mapping[str, str]) -> Any:
     if source.kind not in kinds:
         raise wrong_kind(source.kind, kinds, str(data))
     return source.designs if kinds[source.kind] == "designs" else source.data
-
-
-@cache
-def _kinds() -> dict[str, dict[str, str]]:
-    """Return for every figure the kinds of its results, each with the part that its function takes."""
-    found: dict[str, dict[str, str]] = {}
-    for kind, figures in CATALOGUE.items():
-        for figure in figures:
-            found.setdefault(figure.name, {})[kind] = figure.takes
-    return found

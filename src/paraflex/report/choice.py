@@ -11,9 +11,10 @@ from numpy.typing import NDArray
 
 from paraflex.figures.designs import DesignTable, column_label, fronts, in_conflict, undominated
 
-# Largest number of rows drawn and of runs in motion; numbers of the latter that are best in the first metric, and that
-# are on the front.
-MOST_ROWS, MOST_RUNS, _BEST, _FRONT = 5000, 8, 3, 2
+# Largest number of rows drawn and of runs in motion, and number of the latter that are on the front.
+MOST_ROWS, MOST_RUNS, _FRONT = 5000, 8, 2
+# Places of the runs in motion that are best in the first metric, in words.
+_PLACES = ("", ", second", ", third")
 # Number of metrics whose fronts are always kept.
 _FRONTS = 8
 
@@ -36,8 +37,8 @@ def best_runs(designs: DesignTable) -> list[Picked]:
         return []
     first, *others = judged
     why: dict[int, list[str]] = {}
-    for place, row in enumerate(_least(designs, first)[:_BEST]):
-        why.setdefault(row, []).append(f"{column_label(first)}{'' if place == 0 else f', {_nth(place + 1)}'}")
+    for place, row in enumerate(_least(designs, first)[: len(_PLACES)]):
+        why.setdefault(row, []).append(f"{column_label(first)}{_PLACES[place]}")
     best = next(iter(why))
     for name, row in _least_of_series(designs, first).items():
         if row == best:
@@ -108,7 +109,3 @@ def _knees(designs: DesignTable, across: str, up: str) -> list[int]:
     inner = front[1:-1]
     away = np.hypot(*((v[inner] - v[front].min()) / max(float(np.ptp(v[front])), 1e-300) for v in (x, y)))
     return [int(row) for row in inner[np.argsort(away, kind="stable")[:_FRONT]]]
-
-
-def _nth(number: int) -> str:
-    return {2: "second", 3: "third"}.get(number, f"{number}th")

@@ -11,8 +11,8 @@ import xarray as xr
 from paraflex.arguments import checked_arguments
 from paraflex.figures.reduction import reduced_runs
 from paraflex.figures.run_motion import deflections_of
-from paraflex.figures.run_tables import Runs, solver_table
-from paraflex.figures.selection import as_runs, names_of
+from paraflex.figures.run_tables import Runs, most_bent, solver_table
+from paraflex.figures.selection import as_runs, names_of, samples
 from paraflex.findings import DONE_STATUSES
 from paraflex.formatting import number, peak, quantity, text_symbol, typeset
 from paraflex.report.film import NO_SHAPES, animation
@@ -81,15 +81,11 @@ def _torque(values: xr.DataArray) -> str:
 
 def _figures(data: xr.Dataset) -> list[tuple[str, str, str]]:
     tiles = load_tiles({"": load_figures(data)})
-    deflections = deflections_of(data)
-    if peak(deflections):
-        body = int(np.argmax([peak(one) for one in deflections.T]))
-        name = text_symbol(str(data["body"].values[body]))
-        tiles.append(("largest deflection", quantity(peak(deflections), "m"), name))
+    if body := most_bent(data):
+        tiles.append(("largest deflection", quantity(peak(deflections_of(data)), "m"), text_symbol(body)))
     status = str(data["status"].item())
     last = "" if status in DONE_STATUSES else "last sample "
-    reached = np.isfinite(data["angle"].values).all(axis=1)
-    end = np.max(data["time"].values[reached], initial=0.0)
+    end = data["time"].values[max(samples(data) - 1, 0)]
     ended = ("status", status, f"{last}t = {number(end)} s, computed in {number(data['wall_time'].item(), 3)} s")
     # The failure of a run comes before its numbers.
     return [ended, *tiles] if last else [*tiles, ended]

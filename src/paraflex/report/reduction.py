@@ -4,12 +4,10 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-import numpy as np
 import xarray as xr
 
 from paraflex.arguments import checked_arguments
-from paraflex.figures.reduction import bound_sentences, states_text
-from paraflex.figures.selection import names_of
+from paraflex.figures.reduction import bound_sentences
 from paraflex.formatting import number
 from paraflex.report.kind_page import kind_page
 from paraflex.report.page import Page
@@ -31,18 +29,5 @@ def reduction_page(data: xr.Dataset) -> Page:
             ("damping ratio of responses", number(float(attrs["damping_ratio"]))),
             *page.facts,
         ],
-        figures=_tiles(data),
         remarks=list(bound_sentences(data)),
     )  # fmt: skip
-
-
-def _tiles(data: xr.Dataset) -> list[tuple[str, str, str]]:
-    """Return tiles of the largest number of states that any output needs, and of the largest error, by method."""
-    tiles = []
-    for name in names_of(data, "reduction"):
-        states, errors = (data[each].sel(reduction=name).values for each in ("states", "largest_error"))
-        tiles.append((f"states needed, {name}", states_text(float(np.max(states))), "for every mode and output"))
-        tiles.append(
-            (f"largest error, {name}", number(float(np.max(errors)), 3), f"{data.attrs['kept_states']} states")
-        )
-    return tiles

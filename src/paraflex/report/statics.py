@@ -14,6 +14,7 @@ from paraflex.arrays import Array
 from paraflex.figures import equilibria
 from paraflex.figures.charts import Panel
 from paraflex.figures.equilibria import quantity_word, unit_of
+from paraflex.figures.selection import names_of
 from paraflex.formatting import NO_VALUE, number, quantity, text_symbol
 from paraflex.report.film import NO_SHAPES, Animation, animation, frames_of
 from paraflex.report.kind_page import kind_page
@@ -78,12 +79,9 @@ def _film(data: xr.Dataset) -> Animation | None:
 
 def _subtitle(data: xr.Dataset) -> str:
     """Return a text on the coordinates that are moved, loaded and held."""
-    words = {"moved": "moved", "loaded": "loaded", "held": "held"}
-    found = {
-        word: [text_symbol(str(name)) for name, role in zip(data["named"].values, data["role"].values, strict=True)
-               if role == kind] for kind, word in words.items()
-    }  # fmt: skip
-    return "; ".join(f"{', '.join(names)} {word}" for word, names in found.items() if names) or "at rest"
+    found = {role: list(map(text_symbol, names_of(data.isel(named=data["role"].values == role), "named")))
+             for role in ("moved", "loaded", "held")}  # fmt: skip
+    return "; ".join(f"{', '.join(names)} {role}" for role, names in found.items() if names) or "at rest"
 
 
 def _tiles(data: xr.Dataset, summary: dict[str, Any]) -> list[tuple[str, str, str]]:
