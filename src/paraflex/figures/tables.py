@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -164,17 +165,12 @@ class Table:
         count = len(self.columns[0].cells)
         if len(rows) == count:
             return self
-        columns = [
-            replace(
-                one,
-                **{
-                    name: [values[k] for k in rows]
-                    for name in ("cells", "below", "errors")
-                    if (values := getattr(one, name))
-                },
-            )
-            for one in self.columns
-        ]
+
+        def some(values: Sequence[Any]) -> list[Any]:
+            return [values[k] for k in rows] if values else []
+
+        columns = [replace(one, cells=some(one.cells), below=some(one.below), errors=some(one.errors))
+                   for one in self.columns]  # fmt: skip
         return replace(self, title=f"{self.title} ({len(rows)} of {count})", columns=columns)
 
 

@@ -116,14 +116,11 @@ def drawings(
         )  # fmt: skip
     for point in points:
         point_number(source.data, point, "--point")
+    shown: list[tuple[str, dict[str, Any]]] = [(point, {"point": point}) for point in points]
     if figure.points == "points":
-        return [_of_points(one, ",".join(points), points=list(points)) for one in figures]
-    return [_of_points(one, point, point=point) for one in figures for point in points]
-
-
-def _of_points(planned: PlannedFigure, named: str, **points: Any) -> PlannedFigure:
-    of = f"{planned.of}_{named}" if planned.of else named
-    return PlannedFigure(planned.figure, of, partial(planned.draw, **points))
+        shown = [(",".join(points), {"points": list(points)})]
+    return [PlannedFigure(figure, "_".join(filter(None, (one.of, named))), partial(one.draw, **chosen))
+            for one in figures for named, chosen in shown]  # fmt: skip
 
 
 def _of_modes(

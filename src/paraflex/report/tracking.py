@@ -94,23 +94,17 @@ def _figures(data: xr.Dataset) -> list[tuple[str, str, str]]:
     """Return the tiles of the main numbers; failed modes come first, and numbers are those of complete modes."""
     rms, words = headline(data)
     whole = finished(data)
-    errors_rms = np.where(whole, rms.values, np.nan)
-    several = data.sizes["mode"] > 1
-    peaks = np.where(whole, [peak(one) for one in data["torque"].values], np.nan)
+    least, effort = "least " if data.sizes["mode"] > 1 else "", effort_axis(data)
     tiles = [] if whole.all() else [_broken_off(data, whole)]
-    if np.isfinite(errors_rms).any():
-        best = int(np.nanargmin(errors_rms))
-        value = quantity(errors_rms[best], "m")
-        tiles.append((f"{'least ' if several else ''}RMS error {words}", value, _name(data, best)))
-    if np.isfinite(peaks).any():
-        least = int(np.nanargmin(peaks))
-        effort = effort_axis(data)
-        name = f"{'least ' if several else ''}peak {effort.name}"
-        tiles.append((name, quantity(peaks[least], effort.unit), _name(data, least)))
-    deflections = np.where(whole, [peak(one) for one in deflections_of(data)], np.nan)
-    if np.isfinite(deflections).any() and np.nanmax(deflections) > 0.0:
-        most = int(np.nanargmax(deflections))
-        tiles.append(("largest deflection", quantity(deflections[most], "m"), _name(data, most)))
+    for name, values, unit, choose in (
+        (f"{least}RMS error {words}", rms.values, "m", np.nanargmin),
+        (f"{least}peak {effort.name}", [peak(one) for one in data["torque"].values], effort.unit, np.nanargmin),
+        ("largest deflection", [peak(one) or np.nan for one in deflections_of(data)], "m", np.nanargmax),
+    ):
+        known = np.where(whole, values, np.nan)
+        if np.isfinite(known).any():
+            run = int(choose(known))
+            tiles.append((name, quantity(known[run], unit), _name(data, run)))
     return [*tiles, *load_tiles({name: load_figures(data.sel(mode=name)) for name in names_of(data, "mode")})]
 
 
