@@ -36,11 +36,10 @@ def set_scale(
     panel: Axes, direction: Literal["x", "y"], axis: Axis, values: Array, unit: DisplayUnit, *, marked: bool = False
 ) -> None:
     """Set scale, limits and lines of an axis; if all of its values are `marked`, there is room beside them."""
-    own, set_limits, change = (
-        getattr(panel, name.format(direction)) for name in ("{}axis", "set_{}lim", "set_{}scale")
-    )
+    own, set_limits = getattr(panel, f"{direction}axis"), getattr(panel, f"set_{direction}lim")
+    set_kind = getattr(panel, f"set_{direction}scale")
     if axis.linear_below:
-        change("symlog", linthresh=axis.linear_below * unit.factor, linscale=0.5)
+        set_kind("symlog", linthresh=axis.linear_below * unit.factor, linscale=0.5)
         own.set_major_locator(FixedLocator((unit.factor * symmetrical_numbers(axis)).tolist()))
         own.set_major_formatter(_written)
     elif is_logarithmic(axis, values):
