@@ -241,11 +241,8 @@ class Chart:
     @property
     def has_values(self) -> bool:
         """Whether any curve has a point."""
-        return any(
-            bool(np.any(np.isfinite(np.asarray(curve.y, dtype=float))
-                        & (True if curve.x is None else np.isfinite(np.asarray(curve.x, dtype=float)))))
-            for curve in self.curves
-        )  # fmt: skip
+        points = (joined([one.y]) + (0.0 if one.x is None else joined([one.x])) for one in self.curves)
+        return any(bool(np.isfinite(each).any()) for each in points)
 
     @property
     def over_time(self) -> bool:

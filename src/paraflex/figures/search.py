@@ -10,7 +10,7 @@ import numpy as np
 from paraflex.figures.charts import Array, Axis, Chart, Curve, Look, Mark, is_wide, look, stairs
 from paraflex.figures.designs import column_label
 from paraflex.figures.entry import figure
-from paraflex.figures.tables import Column, Table, in_row_units
+from paraflex.figures.tables import Column, Table, columns_of, in_row_units
 from paraflex.formatting import common_unit, number, quantity
 from paraflex.units import PERCENT
 
@@ -191,8 +191,7 @@ def target_table(found: Mapping[str, Any], units: Mapping[str, str]) -> Table:
     """Return the table of the targets of an identification, and what the best design and the start reach."""
     targets = found.get("targets") or []
     columns = in_row_units(
-        [Column(name, [one[key] for one in targets], digits=5)
-         for name, key in (("target", "value"), ("reached", "reached"), ("start", "start"))],
+        columns_of(targets, ("target", "value", ""), ("reached", "reached", ""), ("start", "start", ""), digits=5),
         [units.get(one["metric"], "") for one in targets],
     )  # fmt: skip
     off = [_relative(one["reached"], one["value"]) for one in targets]
@@ -209,12 +208,11 @@ def target_table(found: Mapping[str, Any], units: Mapping[str, str]) -> Table:
 def index_table(found: Mapping[str, Any]) -> Table:
     """Return the table of Sobol indices: a row for each metric, path, mode and parameter."""
     rows = found["indices"]
-    words = [Column("metric", [column_label(row["metric"]) for row in rows])]
-    words += [Column(key, [row[key] for row in rows]) for key in ("path", "mode", "parameter")]
+    words = [Column("metric", [column_label(row["metric"]) for row in rows]),
+             *columns_of(rows, *((key, key, "") for key in ("path", "mode", "parameter")))]  # fmt: skip
     numbers = []
     for key, name in (("first", "first order"), ("total", "total")):
-        numbers.append(Column(name, [row[key] for row in rows], digits=3))
-        numbers.append(Column("± (95 %)", [row[f"{key}_confidence"] for row in rows], digits=3))
+        numbers += columns_of(rows, (name, key, ""), ("± (95 %)", f"{key}_confidence", ""), digits=3)
     return Table("Sobol indices", [*words, *numbers])
 
 

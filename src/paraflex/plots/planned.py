@@ -49,12 +49,6 @@ def _vibrates(found: Any) -> bool:
     return any(True for _ in drawn_modes(found, rigid=False))
 
 
-# Conditions on the results for a figure, in addition to its variables.
-_DRAWABLE: Mapping[str, Callable[[Any], bool]] = {
-    "mode_shapes": _vibrates,
-}
-
-
 def figures_of(source: Source, *, written: bool = False) -> list[CatalogueFigure]:
     """Return the figures that can be drawn of some results; only those that their command writes if `written`."""
     figures = (one for one in CATALOGUE[source.kind] if not written or one.is_written(source.data))
@@ -158,7 +152,7 @@ def _can_be_drawn(figure: CatalogueFigure, source: Source) -> bool:
         return source.designs is not None and bool(source.designs.series)
     if figure.takes == "models":
         return prototype_pair(source.data) is not None
-    return figure.can_show(source.data) and (figure.name not in _DRAWABLE or _DRAWABLE[figure.name](source.data))
+    return figure.can_show(source.data) and (figure.name != "mode_shapes" or _vibrates(source.data))
 
 
 def _chosen(source: Source, modes: Sequence[str]) -> list[str]:
