@@ -450,6 +450,13 @@ def test_response_curves_show_the_table(results: Path) -> None:
     assert [axes.get_xlabel() for axes in rows] == ["$x$ [mm]", "$y$ [kg]"]
 
 
+def test_a_point_at_rest_has_a_panel(results: Path) -> None:
+    (figure,) = drawn(open_source(results / "tracking"), "end_effector_path", points=["proximal1.A1"])
+    (axes,) = figure.axes
+    assert np.diff(axes.get_xlim())[0] == pytest.approx(1.0)
+    assert figure.get_figheight() > 20.0 * MM
+
+
 def test_the_front_is_of_what_no_other_design_is_better_than(results: Path) -> None:
     rng = np.random.default_rng(5)
     x, y = rng.integers(0, 12, (2, 80)).astype(float)

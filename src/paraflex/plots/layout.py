@@ -34,6 +34,8 @@ _PAGE, _LOWEST = 225.0, 9.0
 # Margin around a plane as a share of its size, smallest and largest ratio of a panel's height to its width, and the
 # largest for a figure of two columns.
 _MARGIN, _FLATTEST, _TALLEST, _TALLEST_WIDE = 0.06, 0.3, 1.3, 0.75
+# Extent of a plane below which it is that of a point, as a share of the distance from the origin.
+_AT_REST = 1e-9
 # Room for the parts around a panel [mm].
 _EDGE = 1.0
 _LEGEND_LINE = 4.2
@@ -184,7 +186,9 @@ def finish_plane(figure: Figure, axes: Axes) -> Figure:
     """Set the limits of the only panel, with a margin and a least size for a line or point, and lay out the figure."""
     box = axes.dataLim
     width, height = ((1.0 + 2.0 * _MARGIN) * extent for extent in (box.width, box.height))
-    width = max(width, height / (_TALLEST if is_narrow(ONE_COLUMN) else _TALLEST_WIDE)) or 1.0
+    width = max(width, height / (_TALLEST if is_narrow(ONE_COLUMN) else _TALLEST_WIDE))
+    # A point at rest moves by rounding errors.
+    width = width if width > _AT_REST * np.max(np.abs(box.get_points())) else 1.0
     height = max(height, _FLATTEST * width)
     middle_x, middle_y = box.x0 + 0.5 * box.width, box.y0 + 0.5 * box.height
     axes.set_xlim(middle_x - 0.5 * width, middle_x + 0.5 * width)
