@@ -8,11 +8,10 @@ from dataclasses import replace
 import numpy as np
 import xarray as xr
 
-from paraflex.errors import InputError
 from paraflex.figures.charts import DOTTED, Array, Axis, Chart, Curve, Look, look
 from paraflex.figures.entry import figure
 from paraflex.figures.runs import compared, followed, of_names, ranges, run_names, stopped_runs
-from paraflex.figures.selection import names_of, point_number
+from paraflex.figures.selection import names_of, place_of, point_number
 from paraflex.formatting import peak, text_symbol
 from paraflex.units import EFFORTS
 
@@ -68,9 +67,7 @@ def tip_deflections(data: xr.Dataset, bodies: Sequence[str] | None = None) -> It
     """
     known = names_of(data, "body")
     for name in bodies or ():
-        if name not in known:
-            remedy = f"one of {', '.join(known)}"
-            raise InputError("no such body in these results", field="bodies", value=name, remedy=remedy)
+        place_of(name, known, "body", "bodies")
     chosen = [name for name in known if _bends(data, name)] if bodies is None else list(bodies)
     for identity, variable, axis, title in (
         ("axial", "tip_axial", Axis("axial displacement", "m"), "Displacements of the links' ends along them"),
