@@ -450,6 +450,13 @@ def test_response_curves_show_the_table(results: Path) -> None:
     assert [axes.get_xlabel() for axes in rows] == ["$x$ [mm]", "$y$ [kg]"]
 
 
+def test_a_point_at_rest_has_a_panel(results: Path) -> None:
+    (figure,) = drawn(open_source(results / "tracking"), "end_effector_path", points=["proximal1.A1"])
+    (axes,) = figure.axes
+    assert np.diff(axes.get_xlim())[0] == pytest.approx(1.0)
+    assert figure.get_figheight() > 20.0 * MM
+
+
 def test_the_front_is_of_what_no_other_design_is_better_than(results: Path) -> None:
     rng = np.random.default_rng(5)
     x, y = rng.integers(0, 12, (2, 80)).astype(float)
@@ -460,6 +467,8 @@ def test_the_front_is_of_what_no_other_design_is_better_than(results: Path) -> N
     assert {(x[i], y[i]) for i in range(80) if not worse[i]} == {(x[i], y[i]) for i in front}
     assert list(x[front]) == sorted(x[front])
     assert undominated(np.zeros(0), np.zeros(0)).size == 0
+    # A design without one of the metrics neither is on the front nor ends it.
+    assert undominated(np.array([0.0, 1.0, 2.0, np.nan]), np.array([3.0, np.nan, 1.0, 0.0])).tolist() == [0, 2]
     (figure,) = drawn(open_source(results / "sweep"), "pareto_front")
     # Thin links err, thick ones are heavy and want torque.
     assert figure.axes[0].get_xlabel().startswith("RMS tracking error")

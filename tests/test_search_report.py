@@ -8,10 +8,9 @@ from html import unescape
 
 import pytest
 
-from paraflex.figures.search import tables
+from paraflex.figures.search import tables, tiles as search_tiles
 from paraflex.formatting import display_unit
 from paraflex.report.choice import best_runs
-from paraflex.report.search import search_tiles
 from paraflex.report.sweep import StudyAccount, sweep_page
 from paraflex.report.text import sections
 from test_sweep_report import made_up

@@ -10,9 +10,9 @@ import pytest
 from paraflex.designs.reopen import open_study, rerun
 from paraflex.designs.units import unit_of
 from paraflex.errors import InputError
-from paraflex.figures.designs import DesignTable, failure_table, in_conflict, read_designs, undominated
+from paraflex.figures.designs import DesignTable, failure_table, fronts, in_conflict, read_designs, undominated
 from paraflex.files import library_file
-from paraflex.report.choice import MOST_RUNS, best_runs, drawn_rows, fronts
+from paraflex.report.choice import MOST_RUNS, best_runs, drawn_rows
 from paraflex.report.film import frames_of
 from paraflex.report.sweep import StudyAccount, sweep_page
 from paraflex.studies import load_optimisation, load_sweep, optimise, sweep

@@ -6,16 +6,16 @@ Numbers of a description are in SI units; what draws it converts them by `shown_
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from paraflex.arrays import Array
 from paraflex.formatting import common_unit, display_unit, labelled
 from paraflex.units import DisplayUnit
 
-Array = NDArray[np.float64]
 Mark = Literal["", "ring", "cross", "square", "dot", "triangle", "diamond", "bar"]
 
 # Numbers of colours and of dashes; the latter include the solid line.
@@ -241,11 +241,8 @@ class Chart:
     @property
     def has_values(self) -> bool:
         """Whether any curve has a point."""
-        return any(
-            bool(np.any(np.isfinite(np.asarray(curve.y, dtype=float))
-                        & (True if curve.x is None else np.isfinite(np.asarray(curve.x, dtype=float)))))
-            for curve in self.curves
-        )  # fmt: skip
+        points = (joined([one.y]) + (0.0 if one.x is None else joined([one.x])) for one in self.curves)
+        return any(bool(np.isfinite(each).any()) for each in points)
 
     @property
     def over_time(self) -> bool:
@@ -264,10 +261,6 @@ class Chart:
     def shown(self, run: int | None, choice: int | None) -> list[Curve]:
         """Return the curves that are shown for a selected run and a choice; None for all of them."""
         return [curve for curve in self.curves if curve.is_shown(run, choice)]
-
-    def with_curves(self, curves: Iterable[Curve]) -> Chart:
-        """Return the chart with other curves."""
-        return replace(self, curves=tuple(curves))
 
     def shown_units(self) -> ShownUnits:
         """Return the units in which the chart is drawn."""

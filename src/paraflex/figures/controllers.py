@@ -14,7 +14,7 @@ from paraflex.figures.entry import figure
 from paraflex.figures.loads import run_columns
 from paraflex.figures.runs import after_motion
 from paraflex.figures.selection import names_of
-from paraflex.figures.tables import Column, Table
+from paraflex.figures.tables import Column, Table, columns_of
 from paraflex.formatting import NO_VALUE, ROUNDING, number, quantity, text_symbol
 from paraflex.results.controllers import (
     APPLIED,
@@ -97,8 +97,7 @@ def controller_table(runs: Mapping[tuple[str, ...], Mapping[str, Any]], heads: S
     return Table("Controllers", [
         *run_columns([run for run, *_ in rows], heads),
         Column("controller", [f"{name}\n{one['law']}" for _, name, one in rows], "law"),
-        *(Column(key, [one[key] for one in controllers], "s", shown=DisplayUnit("ms", 1e3))
-          for key in ("period", "delay")),
+        *columns_of(controllers, ("period", "period", "s"), ("delay", "delay", "s"), shown=DisplayUnit("ms", 1e3)),
         Column("limited", [_limited(one) for one in controllers], "samples"),
         Column("limits", ["\n".join(_limits(one["torques"])) for one in controllers]),
         Column("largest", [_largest(one["torques"]) for one in controllers], "torque"),

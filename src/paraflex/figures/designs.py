@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from paraflex.arrays import Array
 from paraflex.campaign import read_tables
 from paraflex.errors import InputError, suggestion
 from paraflex.figures.charts import Axis, Chart, Curve, Mark, is_wide, look, stairs
@@ -21,8 +22,6 @@ from paraflex.figures.tables import Column, Table
 from paraflex.formatting import NO_VALUE, axis_unit, text_symbol
 from paraflex.results.metrics import JOINT, METRICS, MOTOR, metric_label
 from paraflex.seals import damaged
-
-Array = NDArray[np.float64]
 
 # Metrics by which designs are not chosen: those of the solver, and those for which smaller is not always better.
 _NOT_JUDGED = tuple(metric.name for metric in METRICS.values() if metric.of_solver or not metric.ranked)
@@ -91,12 +90,18 @@ class DesignTable:
             place_of(mode, known, "mode")
         return self.only(np.isin(self.mode, list(modes)))
 
+    @cached_property
+    def series_rows(self) -> dict[tuple[str, str], NDArray[np.intp]]:
+        """Rows of the complete runs of each pair of path and mode."""
+        found: dict[tuple[str, str], list[int]] = {}
+        for row in np.flatnonzero(self.complete):
+            found.setdefault((str(self.path[row]), str(self.mode[row])), []).append(int(row))
+        return {pair: np.array(rows) for pair, rows in found.items()}
+
     @property
     def series(self) -> dict[tuple[str, str], DesignTable]:
         """Complete runs of each pair of path and mode."""
-        done = self.only(self.complete)
-        pairs = dict.fromkeys(zip(done.path.tolist(), done.mode.tolist(), strict=True))
-        return {pair: done.only((done.path == pair[0]) & (done.mode == pair[1])) for pair in pairs}
+        return {pair: self.only(rows) for pair, rows in self.series_rows.items()}
 
     def judged_by(self, names: Sequence[str] | None, most: int) -> list[str]:
         """Return the requested metrics; by default at most `most` of those that vary.
@@ -116,25 +121,27 @@ class DesignTable:
                 )  # fmt: skip
         if names:
             return list(names)
-        # Metrics of single motors and joints are used only if there are no others.
+        if not self._varying:
+            raise InputError("no metric varies", field="metric", remedy="run more designs, or wider ranges")
+        return self._varying[:most]
+
+    @cached_property
+    def _varying(self) -> list[str]:
+        """Metrics that vary: those by which designs are chosen, if any, else all but those of the solver.
+
+        Metrics of single motors and joints are used only if there are no others.
+        """
         varying = [name for name in self.metrics if self._varies(name) and name.partition(".")[0] not in _OF_SOLVER]
         varying = [name for name in varying if _is_judged(name)] or varying
-        chosen = ([name for name in varying if not name.startswith(_OF_MEMBERS)] or varying)[:most]
-        if not chosen:
-            raise InputError("no metric varies", field="metric", remedy="run more designs, or wider ranges")
-        return chosen
+        return [name for name in varying if not name.startswith(_OF_MEMBERS)] or varying
 
     @property
     def judged(self) -> list[str]:
         """Metrics by which designs are chosen (smaller is better) and which vary; the first one if none varies."""
-        if not self.complete.any():
-            return []
-        try:
-            found = self.judged_by(None, len(self.metrics))
-        except InputError:
-            found = [name for name, values in self.metrics.items() if np.isfinite(values).any()]
-            return [name for name in found if _is_judged(name)][:1]
-        return [name for name in found if _is_judged(name)]
+        if self._varying or not self.complete.any():
+            return [name for name in self._varying if _is_judged(name)]
+        known = (name for name, values in self.metrics.items() if np.isfinite(values).any())
+        return list(filter(_is_judged, known))[:1]
 
     def values(self, row: int) -> tuple[float, ...]:
         """Return the parameter values of a row's design, in the order of the parameters."""
@@ -230,20 +237,21 @@ def in_conflict(table: DesignTable, judged: Sequence[str]) -> list[str]:
     if len(judged) < 2:
         return list(judged)
     first, *others = judged
-    series = table.series.values()
+    return [first, max(others, key=lambda other: sum(rows.size for rows in fronts(table, first, other)))]
 
-    def length(other: str) -> int:
-        return sum(undominated(runs.metrics[first], runs.metrics[other]).size for runs in series)
 
-    return [first, max(others, key=length)]
+def fronts(table: DesignTable, across: str, up: str) -> list[NDArray[np.intp]]:
+    """Return the rows of each path and mode that no other row dominates in two metrics."""
+    x, y = table.metrics[across], table.metrics[up]
+    return [rows[undominated(x[rows], y[rows])] for rows in table.series_rows.values()]
 
 
 def undominated(x: Array, y: Array) -> NDArray[np.intp]:
-    """Return the indices of the points (x, y) that no other point dominates (smaller is better), sorted by x."""
+    """Return the indices of the finite points (x, y) that no other point dominates (smaller is better), sorted by x."""
     order = np.lexsort((y, x))
-    least = np.minimum.accumulate(y[order])
-    better = np.concatenate([[True], y[order][1:] < least[:-1]]) if order.size else np.zeros(0, dtype=bool)
-    return order[better]
+    order = order[np.isfinite(x[order]) & np.isfinite(y[order])]
+    before = np.minimum.accumulate(np.append(np.inf, y[order]))[:-1]
+    return order[y[order] < before]
 
 
 # Charts
@@ -300,9 +308,7 @@ def pareto_front(table: DesignTable, metrics: Sequence[str] | None = None) -> It
     curves = []
     for k, (pair, runs) in enumerate(table.series.items()):
         x, y = (runs.metrics[name] for name in chosen)
-        known, name = np.isfinite(x) & np.isfinite(y), table.series_name(pair)
-        x, y = x[known], y[known]
-        front = undominated(x, y)
+        front, name = undominated(x, y), table.series_name(pair)
         corners = stairs(x[front], y[front])
         curves += [_marked(k, f"{name}, designs", x, y, faint=True), Curve("", corners[1], corners[0], look(k)),
                    _marked(k, f"{name}, front", x[front], y[front])]  # fmt: skip

@@ -118,23 +118,28 @@ def joint_force_travel(data: xr.Dataset) -> Iterator[Chart]:
 
 def buckling_chart(data: xr.Dataset) -> Iterator[Chart]:
     """Yield the chart of the buckling shapes at the last stable equilibrium that has any, for the page."""
-    seen = seen_buckling(data)
-    if seen is None:
-        return
-    step, numbers = seen
     curves, choices = [], []
-    places = data["shape"].values[step].astype(float)
-    size = float(np.max(np.ptp(places, axis=0)))
-    for choice, which in enumerate(numbers):
-        swung = places + _SWING * size * data["buckling_shape"].values[step, which]
-        curves += [*_outlines(data, places, PLAIN_LOOK._replace(dash=DOTTED), "before", choice),
+    for choice, (_, factor, (before, swung)) in enumerate(buckled(data)):
+        curves += [*_outlines(data, before, PLAIN_LOOK._replace(dash=DOTTED), "before", choice),
                    *_outlines(data, swung, None, "", choice)]  # fmt: skip
-        choices.append(f"load factor {data['buckling_factor'].values[step, which]:.4g}")
+        choices.append(f"load factor {factor:.4g}")
+    if not choices:
+        return
     yield Chart(
         "buckling", "Buckling shapes" if len(choices) > 1 else f"Buckling shape at {choices[0]}", Axis("y", "m"),
         curves, Axis("x", "m"), choices if len(choices) > 1 else (), choosing="factor", equal=True,
         note="The size of the displacements is arbitrary.",
     )  # fmt: skip
+
+
+def buckled(data: xr.Dataset) -> Iterator[tuple[int, float, Array]]:
+    """Yield the step of `seen_buckling`, and for each factor there the stations before and after (2, stations, 2)."""
+    step, numbers = seen_buckling(data) or (0, ())
+    places = data["shape"].values[step].astype(float)
+    swing = _SWING * float(np.max(np.ptp(places, axis=0)))
+    for which in numbers:
+        factor, shape = (data[f"buckling_{name}"].values[step, which] for name in ("factor", "shape"))
+        yield step, float(factor), np.stack([places, places + swing * shape])
 
 
 def shape_chart(data: xr.Dataset) -> Chart:

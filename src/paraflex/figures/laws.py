@@ -7,7 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 import xarray as xr
 
-from paraflex.figures.charts import Array, Axis, Chart, Curve, Mark, is_wide, look
+from paraflex.figures.charts import Axis, Chart, Curve, Mark, is_wide, look
 from paraflex.figures.entry import figure
 from paraflex.figures.selection import names_of
 from paraflex.figures.tables import Column, Table
@@ -37,7 +37,8 @@ def law_comparison(data: xr.Dataset) -> Iterator[Chart]:
         beyond = data[VALIDITY].transpose("mode", "law").values > 1.0
     for name in _metrics(data):
         values = data[name].transpose("mode", "law").values
-        edge = _edge(values)
+        # Marks of failures are at zero, or on a logarithmic axis left of all values.
+        edge = 0.8 * float(np.min(values[values > 0.0])) if is_wide(values) else 0.0
         curves = []
         for k, mode in enumerate(modes):
             # The marks of the modes are spread within the line of a law.
@@ -54,11 +55,6 @@ def law_comparison(data: xr.Dataset) -> Iterator[Chart]:
             curves.append(Curve("beyond what the model can describe", [], [], mark="ring"))
         yield Chart(name, metric_label(name), Axis("", names=laws), curves,
                     Axis("", data[name].attrs["units"], log=True, low=None if is_wide(values) else 0.0))  # fmt: skip
-
-
-def _edge(values: Array) -> float:
-    """Return the abscissa of the marks of failures: zero, or on a logarithmic axis left of all values."""
-    return 0.8 * float(np.min(values[values > 0.0])) if is_wide(values) else 0.0
 
 
 def _metrics(data: xr.Dataset) -> list[str]:

@@ -17,6 +17,7 @@ from paraflex.figures.selection import names_of, place_of
 from paraflex.figures.tables import Column, Table
 from paraflex.formatting import NO_VALUE, number, text_symbol
 from paraflex.results.linear_summary import (
+    END_EFFECTOR,
     HELD_WORDS,
     HOLDINGS,
     MAP_WORDS,
@@ -222,6 +223,26 @@ def tables(data: xr.Dataset) -> Iterator[Table]:
         columns = [Column("mode", modes), Column("lowest zeros", list(map(_lowest, zeros))),
                    Column("minimum phase", list(map(_phase, zeros)))]  # fmt: skip
         yield Table(f"Zeros: {MAP_WORDS[name]}", columns, _ROOTS_NOTE)
+
+
+def tiles(data: xr.Dataset) -> list[tuple[str, str, str]]:
+    """Return the tiles of the first frequencies with motors held, and of the lowest right-half-plane zero."""
+    modes = names_of(data, "mode")
+    shown = []
+    first = {mode: oscillations(poles_of(data, mode, "held"))[:1] for mode in modes if motors_of_mode(data, mode)}
+    known = {mode: found[0].frequency for mode, found in first.items() if found}
+    if known:
+        for words, choose in (("lowest", min), ("highest", max))[: 2 if len(known) > 1 else 1]:
+            mode = choose(known, key=lambda name: known[name])
+            shown.append((f"{words} first frequency, motors held", f"{number(known[mode])} Hz", f"mode {mode}"))
+    limits = {mode: limiting_zero(zeros_of(data, mode, END_EFFECTOR)) for mode in modes if END_EFFECTOR in data["map"]}
+    limits = {mode: limit for mode, limit in limits.items() if limit}
+    if limits:
+        mode = min(limits, key=lambda name: limits[name])
+        shown.append(
+            ("lowest right-half-plane zero to the end-effector", f"{number(limits[mode])} rad/s", f"mode {mode}")
+        )
+    return shown
 
 
 def held_rows(data: xr.Dataset) -> list[Row]:

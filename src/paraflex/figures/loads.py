@@ -13,7 +13,7 @@ from paraflex.figures.charts import DOTTED, Axis, Chart, Curve, look
 from paraflex.figures.entry import figure
 from paraflex.figures.runs import followed, of_names, stopped_runs
 from paraflex.figures.selection import names_of
-from paraflex.figures.tables import Cell, Column, Table
+from paraflex.figures.tables import Cell, Column, Table, columns_of
 from paraflex.formatting import NO_VALUE, common_unit, number, peak, text_symbol
 from paraflex.results.beam_stresses import CONTACT, stresses_of
 from paraflex.results.loads import resolved_error, sliding_joints
@@ -104,7 +104,7 @@ def joint_forces(data: xr.Dataset) -> Iterator[Chart]:
             Curve(word, values[:, j], look=look(k), run=0, choice=1 + j if several else None, stopped=stopped)
             for j in range(min(sizes.sizes["joint"], _MOST_CHOICES)) for k, (word, values) in enumerate(parts.items())
         ]  # fmt: skip
-        chart = chart.with_curves([*(curve for curve in chart.curves if curve.choice == 0), *curves])
+        chart = replace(chart, curves=[*(curve for curve in chart.curves if curve.choice == 0), *curves])
     yield replace(chart, choices=chart.choices[: 1 + _MOST_CHOICES])
 
 
@@ -148,7 +148,9 @@ def drive_efforts(data: xr.Dataset) -> Iterator[Chart]:
         ]
         units = dict.fromkeys(unit for one in found.values() for unit in str(one.attrs.get("units", usual)).split(", "))
         whose = " and ".join({"motor": "motors", "drive": "prescribed motions"}[dim] for dim in found)
-        word = {**EFFORTS, "N m, N": "torque, force"}.get(unit := _joined(units), quantity)
+        # Units of rotating members precede those of sliding ones.
+        unit = ", ".join(sorted(units, key=lambda unit: unit in ("N", "m/s")))
+        word = {**EFFORTS, "N m, N": "torque, force"}.get(unit, quantity)
         title = {"torque, force": "Efforts", "power": "Powers"}.get(word, f"{word.capitalize()}s")
         # The chart of the motors' torques alone is also that of `motor_torques`, shown once on a page.
         identity = "torques" if quantity == "effort" and "drive" not in found else f"{quantity}s"
@@ -158,11 +160,6 @@ def drive_efforts(data: xr.Dataset) -> Iterator[Chart]:
         yield followed(
             Chart(identity, f"{title} of {whose}", axis, choosing=choosing), data, both.assign_attrs(units=unit)
         )
-
-
-def _joined(units: Mapping[str, None]) -> str:
-    """Return units of rotating members, then of sliding ones."""
-    return ", ".join(sorted(units, key=lambda unit: unit in ("N", "m/s")))
 
 
 @figure(
@@ -220,10 +217,8 @@ def stress_table(loads: LoadsOfRuns, heads: Sequence[str] = (), *, largest: bool
         Column("beam", [body for _, body, _ in rows]),
         _largest(figures, "stress", "Pa"),
         Column("safety factor", [_safety(one["safety_factor"]) for one in figures]),
-        *(Column(head, [one[key] for one in figures], unit) for head, key, unit in (
-            ("at", "place", "m"), ("time", "time", "s"),
-            ("bending", "bending_stress_max", "Pa"), ("axial", "axial_stress_max", "Pa"),
-        )),
+        *columns_of(figures, ("at", "place", "m"), ("time", "time", "s"), ("bending", "bending_stress_max", "Pa"),
+                    ("axial", "axial_stress_max", "Pa")),
     ]  # fmt: skip
     return Table("Stresses of beams", columns, note).filled()
 
@@ -246,9 +241,7 @@ def effort_table(loads: Mapping[str, Any]) -> Table:
         else:
             columns.append(Column(head, [one[f"{key}_max"] for one in rows], rows[0][f"{key}_unit"]))
         columns.append(Column("at", [one[f"{key}_time"] for one in rows], "s"))
-    columns += [Column(head, [one[key] for one in rows], unit) for head, key, unit in (
-        ("power", "power_max", "W"), ("at", "power_time", "s"), ("energy", "energy", "J"),
-    )]  # fmt: skip
+    columns += columns_of(rows, ("power", "power_max", "W"), ("at", "power_time", "s"), ("energy", "energy", "J"))
     note = "Largest magnitudes and their times; energy: integral of the power's magnitude."
     return Table("Motors and prescribed motions", columns, note)
 
@@ -269,10 +262,8 @@ def joint_tables(loads: Mapping[str, Any]) -> Iterator[Table]:
             note += _ERRORS
         yield Table(title, [
             Column("joint", list(own)),
-            *(Column(head, [one[key] for one in rows], unit, shown=shown)
-              for head, key in (("from", "least"), ("to", "most"))),
-            Column("speed", [one["speed_max"] for one in rows], f"{unit}/s"),
-            Column("at", [one["speed_time"] for one in rows], "s"),
+            *columns_of(rows, ("from", "least", unit), ("to", "most", unit), shown=shown),
+            *columns_of(rows, ("speed", "speed_max", f"{unit}/s"), ("at", "speed_time", "s")),
             *(column for key, of in (("force", "N"), ("moment", "N m")) for column in (
                 _largest(rows, key, of, beside=wide[key]),
                 Column("at", [_time(one, key, wide[key]) for one in rows], "s"),

@@ -173,11 +173,6 @@ def tables(data: xr.Dataset) -> Iterator[Table]:
         yield _along_table(data)
 
 
-def states_text(states: float) -> str:
-    """Return a number of states needed as text."""
-    return number(states, missing=_MANY)
-
-
 def _wanted(data: xr.Dataset) -> str:
     """Return the wanted error and the highest frequency: "1 % up to 40 Hz"."""
     return f"{number(100.0 * float(data.attrs['accuracy']))} % up to {number(float(data.attrs['until']))} Hz"
@@ -234,6 +229,20 @@ def _along_table(data: xr.Dataset) -> Table:
     )
     note = "Largest errors of responses, and of frequencies with motors free and held."
     return Table(title, [*columns, Column(limit, list(within), f"at [{unit.name}]")], note)
+
+
+def tiles(data: xr.Dataset) -> list[tuple[str, str, str]]:
+    """Return tiles of the largest number of states that any output needs, and of the largest error, by method."""
+    shown = []
+    for name in names_of(data, "reduction"):
+        states, errors = (data[each].sel(reduction=name).values for each in ("states", "largest_error"))
+        shown.append(
+            (f"states needed, {name}", number(float(np.max(states)), missing=_MANY), "for every mode and output")
+        )
+        shown.append(
+            (f"largest error, {name}", number(float(np.max(errors)), 3), f"{data.attrs['kept_states']} states")
+        )
+    return shown
 
 
 def bound_sentences(data: xr.Dataset) -> Iterator[str]:

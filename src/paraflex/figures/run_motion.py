@@ -8,11 +8,10 @@ from dataclasses import replace
 import numpy as np
 import xarray as xr
 
-from paraflex.errors import InputError
 from paraflex.figures.charts import DOTTED, Array, Axis, Chart, Curve, Look, look
 from paraflex.figures.entry import figure
 from paraflex.figures.runs import compared, followed, of_names, ranges, run_names, stopped_runs
-from paraflex.figures.selection import names_of, point_number
+from paraflex.figures.selection import names_of, place_of, point_number
 from paraflex.formatting import peak, text_symbol
 from paraflex.units import EFFORTS
 
@@ -68,9 +67,7 @@ def tip_deflections(data: xr.Dataset, bodies: Sequence[str] | None = None) -> It
     """
     known = names_of(data, "body")
     for name in bodies or ():
-        if name not in known:
-            remedy = f"one of {', '.join(known)}"
-            raise InputError("no such body in these results", field="bodies", value=name, remedy=remedy)
+        place_of(name, known, "body", "bodies")
     chosen = [name for name in known if _bends(data, name)] if bodies is None else list(bodies)
     for identity, variable, axis, title in (
         ("axial", "tip_axial", Axis("axial displacement", "m"), "Displacements of the links' ends along them"),
@@ -132,22 +129,44 @@ def link_phases(data: xr.Dataset) -> Iterator[Chart]:
     """Yield the phase diagram, angular velocity over angle; a periodic motion gives a closed curve."""
     angle, rate = (data[name].values for name in ("angle", "angular_velocity"))
     curves = []
+    desired = [data[f"{name}_desired"].values[0] for name in ("angle", "angular_velocity") if "angle_desired" in data]
     for b in range(data.sizes["body"]):
-        curves += _phases(data, angle[..., b], rate[..., b], b)
-        if "angle_desired" in data:
-            way, pace = (data[f"{name}_desired"].values[0, :, b] for name in ("angle", "angular_velocity"))
-            curves.append(Curve("desired", pace, way, Look(dash=DOTTED), choice=b, desired=True))
+        curves += of_member(data, b, [angle[..., b], rate[..., b]], [each[:, b] for each in desired])
     yield Chart(
         "phases", "Phase diagram", replace(RATES.axis(None), extent=peak(rate)), curves,
         replace(ANGLE, extent=peak(angle)), [text_symbol(body) for body in names_of(data, "body")], choosing="link",
     )  # fmt: skip
 
 
-def _phases(data: xr.Dataset, x: Array, y: Array, choice: int) -> Iterator[Curve]:
-    """Yield the curves y over x (runs, samples) of all runs, and a mark where each starts."""
+def of_member(
+    data: xr.Dataset, choice: int, actual: Sequence[Array], desired: Sequence[Array], point: str | None = None,
+    start: Sequence[Array] = (),
+) -> Iterator[Curve]:  # fmt: skip
+    """Yield the curves of a quantity of one member over time, or of the second of two over the first.
+
+    Parameters
+    ----------
+    data : xarray.Dataset
+        Runs, see `selection.as_runs`.
+    choice : int
+        Choice of the chart that shows the member.
+    actual : sequence of (runs, samples) array
+        Values of one or two quantities in all runs. Where a curve over another quantity starts, it has a mark.
+    desired : sequence of (samples,) array
+        Desired values; empty if there are none.
+    point : str, optional
+        Point in place of the end-effector.
+    start : sequence of (samples,) array
+        Values whose first ones have the mark in place of the actual ones.
+    """
     for r, stopped in enumerate(stopped_runs(data)):
-        yield Curve(actual_name(data, r), y[r], x[r], look(0), run=r, shown=(r,), choice=choice, stopped=stopped)
-        yield start_mark(x[r], y[r], r, choice)
+        *x, y = (each[r] for each in actual)
+        yield Curve(actual_name(data, r, point), y, *x, look=look(0), run=r, shown=(r,), choice=choice, stopped=stopped)
+        if x:
+            yield start_mark(*(start or [*x, y]), run=r, choice=choice)
+    if desired:
+        *x, y = desired
+        yield Curve("desired", y, *x, look=Look(dash=DOTTED), choice=choice, desired=True)
 
 
 def start_mark(x: Array, y: Array, run: int, choice: int | None = None) -> Curve:

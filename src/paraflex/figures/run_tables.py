@@ -104,8 +104,8 @@ def result_table(runs: Runs, *, brief: bool = False) -> Table:
         columns += [runs.counts("steps", "steps"), runs.column("wall", "wall_time", "s", digits=3)]
         return Table(f"tracking error {words}, and peak {word}s", columns)
     columns += [
-        runs.column("deflection", lambda run: _bent(run) or None, "m", beside=wide),
-        runs.column("of", _most_bent),
+        runs.column("deflection", lambda run: peak(deflections_of(run)) or None, "m", beside=wide),
+        runs.column("of", most_bent),
         runs.column("strain energy", lambda run: peak(run["strain_energy"]), "J",
                     beside=max(map(energy_scale, runs.data))),
     ]  # fmt: skip
@@ -164,11 +164,7 @@ def _largest_error(run: xr.Dataset) -> float:
     return peak(gaps[in_span])
 
 
-def _bent(run: xr.Dataset) -> float:
-    return peak(deflections_of(run))
-
-
-def _most_bent(run: xr.Dataset) -> str:
+def most_bent(run: xr.Dataset) -> str:
     """Return the body with the largest deflection; empty if none bends."""
     peaks = [peak(one) for one in deflections_of(run).T]
     return names_of(run, "body")[int(np.argmax(peaks))] if max(peaks, default=0.0) else ""

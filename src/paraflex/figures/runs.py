@@ -70,7 +70,7 @@ def followed(chart: Chart, data: xr.Dataset, values: xr.DataArray, desired: xr.D
             curves.append(Curve(run or part, shown[r, :, p], look=look(r), run=r, choice=1 + p, stopped=stopped[r]))
         if wanted is not None:
             curves.append(Curve("desired", wanted[:, p], look=Look(dash=DOTTED), choice=1 + p, desired=True))
-    choices = [f"all {plural(chart.choosing)}", *map(text_symbol, parts)] if several else []
+    choices = [f"all {chart.choosing}s", *map(text_symbol, parts)] if several else []
     curves = [curve for curve in curves if np.isfinite(curve.y).any()]
     return replace(
         chart, y=_in_unit(chart, values), curves=curves, choices=choices, overview=several, spans=after_motion(data)
@@ -156,8 +156,3 @@ def thinned(data: xr.Dataset) -> xr.Dataset:
     """Return every n-th sample of runs and of their controllers if there are more than a chart can show."""
     long = {dim: size for dim, size in data.sizes.items() if str(dim) == "time" or str(dim).startswith("sample_")}
     return data.isel({dim: slice(None, None, -(-size // MOST_SAMPLES) or 1) for dim, size in long.items()})
-
-
-def plural(noun: str) -> str:
-    """Return the plural of a noun for a part of a mechanism."""
-    return "bodies" if noun == "body" else f"{noun}s"

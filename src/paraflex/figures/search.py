@@ -10,14 +10,16 @@ import numpy as np
 from paraflex.figures.charts import Array, Axis, Chart, Curve, Look, Mark, is_wide, look, stairs
 from paraflex.figures.designs import column_label
 from paraflex.figures.entry import figure
-from paraflex.figures.tables import Column, Table, in_row_units
-from paraflex.formatting import number
+from paraflex.figures.tables import Column, Table, columns_of, in_row_units
+from paraflex.formatting import common_unit, number, quantity
 from paraflex.units import PERCENT
 
 IDENTIFICATION = "identification"
 _BEST, _FAILED = Look(0), Look(1)
 # Designs far above the best are drawn at the upper edge; otherwise they would hide the convergence.
 _HIGHEST = 3.0
+# Largest number of tiles for metrics or parameters.
+_MOST_TILES = 2
 # Place of designs that fail below the others, as a share of the height of the panel.
 _BELOW = 0.08
 
@@ -189,8 +191,7 @@ def target_table(found: Mapping[str, Any], units: Mapping[str, str]) -> Table:
     """Return the table of the targets of an identification, and what the best design and the start reach."""
     targets = found.get("targets") or []
     columns = in_row_units(
-        [Column(name, [one[key] for one in targets], digits=5)
-         for name, key in (("target", "value"), ("reached", "reached"), ("start", "start"))],
+        columns_of(targets, ("target", "value", ""), ("reached", "reached", ""), ("start", "start", ""), digits=5),
         [units.get(one["metric"], "") for one in targets],
     )  # fmt: skip
     off = [_relative(one["reached"], one["value"]) for one in targets]
@@ -207,13 +208,36 @@ def target_table(found: Mapping[str, Any], units: Mapping[str, str]) -> Table:
 def index_table(found: Mapping[str, Any]) -> Table:
     """Return the table of Sobol indices: a row for each metric, path, mode and parameter."""
     rows = found["indices"]
-    words = [Column("metric", [column_label(row["metric"]) for row in rows])]
-    words += [Column(key, [row[key] for row in rows]) for key in ("path", "mode", "parameter")]
+    words = [Column("metric", [column_label(row["metric"]) for row in rows]),
+             *columns_of(rows, *((key, key, "") for key in ("path", "mode", "parameter")))]  # fmt: skip
     numbers = []
     for key, name in (("first", "first order"), ("total", "total")):
-        numbers.append(Column(name, [row[key] for row in rows], digits=3))
-        numbers.append(Column("± (95 %)", [row[f"{key}_confidence"] for row in rows], digits=3))
+        numbers += columns_of(rows, (name, key, ""), ("± (95 %)", f"{key}_confidence", ""), digits=3)
     return Table("Sobol indices", [*words, *numbers])
+
+
+def tiles(found: Mapping[str, Any], units: Mapping[str, str]) -> list[tuple[str, str, str]]:
+    """Return tiles of the minimised quantity, then of the identified parameters or of the metrics of the design.
+
+    Parameters
+    ----------
+    found : mapping
+        Result as plain numbers.
+    units : mapping of str to str
+        SI units of parameters and metrics.
+    """
+    identified = found["kind"] == IDENTIFICATION
+    goal = "residual" if identified else "objective"
+    shown_tiles = [(goal, number(found.get(goal)), f"{number(found.get(f'start_{goal}'))} at the start")]
+    now, before = ("values", "start") if identified else ("metrics", "start_metrics")
+    old = found.get(before) or {}
+    for name, value in list((found.get(now) or {}).items())[:_MOST_TILES]:
+        unit = units.get(name, "")
+        shown = common_unit(unit, (value, old.get(name)))
+        label = name.replace("_", " ") if identified else column_label(name)
+        start = number(old.get(name), factor=shown.factor)
+        shown_tiles.append((label, quantity(value, unit, shown, digits=4, padded=False), f"{start} at the start"))
+    return shown_tiles
 
 
 def _relative(value: float | None, other: float | None) -> float | None:

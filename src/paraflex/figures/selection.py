@@ -12,8 +12,6 @@ from paraflex.formatting import is_signs
 
 # Ratio of speeds along the two axes below which the end-effector is at rest along one of them, up to rounding.
 _STILL = 1e-9
-# Ratio of peak tip displacements above which bodies count as twins of a symmetric mechanism and are shown once.
-_ALIKE = 0.9
 
 
 def place_of(name: str, names: Sequence[str], what: str, field: str = "") -> int:

@@ -5,8 +5,9 @@ Numbers are in SI units; `Table.texts` converts and formats them by the one rule
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
@@ -164,18 +165,19 @@ class Table:
         count = len(self.columns[0].cells)
         if len(rows) == count:
             return self
-        columns = [
-            replace(
-                one,
-                **{
-                    name: [values[k] for k in rows]
-                    for name in ("cells", "below", "errors")
-                    if (values := getattr(one, name))
-                },
-            )
-            for one in self.columns
-        ]
+
+        def some(values: Sequence[Any]) -> list[Any]:
+            return [values[k] for k in rows] if values else []
+
+        columns = [replace(one, cells=some(one.cells), below=some(one.below), errors=some(one.errors))
+                   for one in self.columns]  # fmt: skip
         return replace(self, title=f"{self.title} ({len(rows)} of {count})", columns=columns)
+
+
+def columns_of(rows: Iterable[Mapping[str, Any]], *heads: tuple[str, str, str], **more: Any) -> list[Column]:
+    """Return columns of entries of the rows; `heads` are heading, name of the entry, and unit of each column."""
+    rows = list(rows)
+    return [Column(head, [row[name] for row in rows], unit, **more) for head, name, unit in heads]
 
 
 def in_row_units(columns: Sequence[Column], units: Sequence[str]) -> list[Column]:

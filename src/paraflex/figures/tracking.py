@@ -12,9 +12,9 @@ import numpy as np
 import xarray as xr
 
 from paraflex.errors import InputError
-from paraflex.figures.charts import DASHED, DOTTED, Axis, Chart, Curve, Look, look
+from paraflex.figures.charts import DASHED, Axis, Chart, Curve, Look, look
 from paraflex.figures.entry import figure
-from paraflex.figures.run_motion import actual_name, effort_axis, start_mark
+from paraflex.figures.run_motion import actual_name, effort_axis, of_member, start_mark
 from paraflex.figures.runs import (
     after_motion,
     check_magnification,
@@ -28,12 +28,12 @@ from paraflex.figures.selection import moving_directions, names_of, of_point, sa
 from paraflex.formatting import ROUNDING, display_unit, number, peak, quantity, text_symbol
 from paraflex.results.following import headline, ranked_by_motion
 
-# Variables of the end-effector's motion and their axes; {} in a symbol stands for the direction.
-_MOTION = (
-    ("end_effector", "displacement", "m", ""),
-    ("end_effector_velocity", "velocity", "m/s", "\u0307"),
-    ("end_effector_acceleration", "acceleration", "m/s²", "\u0308"),
-)
+# Axes of the variables of the end-effector's motion: name, unit, and the dots of the symbol above the direction.
+_MOTION = {
+    "end_effector": ("displacement", "m", ""),
+    "end_effector_velocity": ("velocity", "m/s", "\u0307"),
+    "end_effector_acceleration": ("acceleration", "m/s²", "\u0308"),
+}
 # Letters of a mode's name and its passive motors that fit above a panel.
 _TITLE_LETTERS = 22
 # Distances up to this one are rounding errors [m].
@@ -187,7 +187,7 @@ def end_effector_motion(data: xr.Dataset, point: str | None = None) -> Iterator[
         Point "body.point" in place of the end-effector; it has no desired motion.
     """
     data = of_point(data, point)
-    for name, *_ in _MOTION:
+    for name in _MOTION:
         yield _of_directions(data, [name], point)
 
 
@@ -202,8 +202,8 @@ def phase_diagrams(data: xr.Dataset, point: str | None = None) -> Iterator[Chart
         Point "body.point" in place of the end-effector; it has no desired motion.
     """
     data = of_point(data, point)
-    for (across, *_), (up, *_) in pairwise(_MOTION):
-        yield _of_directions(data, [across, up], point)
+    for names in pairwise(_MOTION):
+        yield _of_directions(data, names, point)
 
 
 def _of_directions(data: xr.Dataset, names: Sequence[str], point: str | None) -> Chart:
@@ -211,32 +211,22 @@ def _of_directions(data: xr.Dataset, names: Sequence[str], point: str | None) ->
 
     It shows one direction at a time.
     """
-    axes = {name: (word, unit, dots) for name, word, unit, dots in _MOTION}
     actual = [data[name].values for name in names]
     desired = [data[f"{name}_desired"].values[0] for name in names if f"{name}_desired" in data]
     directions, curves = moving_directions(data), []
     for k, direction in enumerate(directions):
         a = names_of(data, "axis").index(direction)
-        for r, stopped in enumerate(stopped_runs(data)):
-            *x, y = (each[r, :, a] for each in actual)
-            curves.append(Curve(actual_name(data, r, point), y, *x, look=look(0), run=r, shown=(r,), choice=k,
-                                stopped=stopped))  # fmt: skip
-            if x:
-                curves.append(
-                    start_mark(*(each[:1, a] for each in desired or [each[r] for each in actual]), run=r, choice=k)
-                )
-        if desired:
-            *x, y = (each[:, a] for each in desired)
-            curves.append(Curve("desired", y, *x, look=Look(dash=DOTTED), choice=k, desired=True))
+        wanted = [each[:, a] for each in desired]
+        curves += of_member(data, k, [each[..., a] for each in actual], wanted, point, wanted)
     *extents, extent = (peak(each) if len(names) > 1 else peak(ranges(each, axis=-2)) for each in desired or actual)
-    word, unit, dots = axes[names[-1]]
+    word, unit, dots = _MOTION[names[-1]]
     chart = Chart(
         "-".join(names), word.capitalize(),
         [Axis(word, unit, f"{direction}{dots}", extent=extent) for direction in directions], curves,
         choices=directions, choosing="direction",
     )  # fmt: skip
     if extents:
-        return replace(chart, x=Axis(*axes[names[0]][:2], extent=extents[0]))
+        return replace(chart, x=Axis(*_MOTION[names[0]][:2], extent=extents[0]))
     return replace(chart, spans=after_motion(data))
 
 

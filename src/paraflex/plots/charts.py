@@ -11,15 +11,14 @@ import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
 
 from paraflex.arguments import checked_arguments
 from paraflex.errors import InputError
 from paraflex.figures.catalogue import all_figures
-from paraflex.figures.charts import Axis, Chart, Curve, is_logarithmic, joined, symmetrical_numbers
+from paraflex.figures.charts import Chart, Curve, joined
 from paraflex.figures.entry import Figure as CatalogueFigure, prepared
 from paraflex.figures.selection import default_mode, names_of, prototype_pair
-from paraflex.formatting import ROUNDING, logarithmic_number, peak, shortened
+from paraflex.formatting import ROUNDING, peak, shortened
 from paraflex.plots.given import drawn
 from paraflex.plots.labels import mathematics
 from paraflex.plots.layout import (
@@ -30,21 +29,17 @@ from paraflex.plots.layout import (
     is_narrow,
     label_outer_time,
     lay_out,
-    panel_grid,
+    panels,
 )
-from paraflex.plots.scales import LIST_LINE, list_lines, mark_powers
-from paraflex.plots.style import BLACK, COLOURS, SHADE, ZERO, journal_style, keep_flat
+from paraflex.plots.scales import BESIDE, LIST_LINE, list_lines, set_scale
+from paraflex.plots.style import BLACK, COLOURS, SHADE, journal_style
 from paraflex.units import DisplayUnit
 
 # Largest number of panels for members below one another in a figure of one column, and of those of designs.
 _MOST_BELOW, _MOST_STACKED = 12, 4
-# Decades of a logarithmic axis shown below its largest value.
-_DECADES = 9.0
 _MARKS = {"ring": "o", "cross": "x", "square": "s", "dot": "o", "triangle": "^", "diamond": "D"}
 # Number of marks from which they are smaller; sizes of few, of many and of faint marks, and of squares on curves [pt].
 _MANY, _SIZE, _SMALL, _FAINT, _SQUARE = 30, 4.0, 2.8, 2.4, 3.0
-# Share by which an axis with marks is longer than its values.
-_BESIDE = 0.06
 # Heights of the thinnest bars, and of one of several marks beside a name [mm].
 _THINNEST, _MARK_LINE = 1.8, 2.6
 # Dashes by their numbers in a look.
@@ -140,9 +135,7 @@ def print_figure(
         return _plane(rows[0][0], time, entry.curves)
     cells = [cell for row in rows for cell in row]
     columns = _columns(entry, len(cells), charts)
-    figure, axes = panel_grid(
-        len(cells), columns, width=ONE_COLUMN if len(cells) == 1 and entry.columns else TWO_COLUMNS
-    )
+    figure, axes = panels(len(cells), columns, width=ONE_COLUMN if len(cells) == 1 and entry.columns else TWO_COLUMNS)
     for k, (panel, cell) in enumerate(zip(axes.flat, cells, strict=False)):
         # Panels side by side share the names on their axes.
         named = k % columns == 0 or cell.chart.axis(None).names != cells[k - 1].chart.axis(None).names
@@ -248,10 +241,10 @@ def _draw(panel: Axes, cell: _Cell, time: Any, most: int, *, named: bool = True)
     if chart.over_time and time is not None and time[0] < time[-1]:
         panel.set_xlim(time[0], time[-1])
     if not chart.over_time and any(curve.mark for curve in shown):
-        panel.margins(x=_BESIDE)
-    _set_scale(panel, "y", axis, joined(unit.factor * np.asarray(curve.y, dtype=float) for curve in shown), unit)
+        panel.margins(x=BESIDE)
+    set_scale(panel, "y", axis, joined(unit.factor * np.asarray(curve.y, dtype=float) for curve in shown), unit)
     xs = joined(units.x.factor * np.asarray(curve.x, dtype=float) for curve in shown if curve.x is not None)
-    _set_scale(panel, "x", chart.x, xs, units.x, marked=bool(shown) and all(curve.mark for curve in shown))
+    set_scale(panel, "x", chart.x, xs, units.x, marked=bool(shown) and all(curve.mark for curve in shown))
     for span in chart.spans:
         label = span.name if not is_narrow(figure_width(panel)) else span.name.replace("the desired", "the")
         low, high = units.x.factor * span.low, units.x.factor * span.high
@@ -306,47 +299,9 @@ def _draw_curve(panel: Axes, curve: Curve, time: Any, x_unit: DisplayUnit, unit:
         panel.plot(x[known[-1]], y[known[-1]], **_STOPPED)
 
 
-def _set_scale(
-    panel: Axes, direction: Any, axis: Axis, values: Any, unit: DisplayUnit, *, marked: bool = False
-) -> None:
-    """Set scale, limits and lines of an axis; if all of its values are `marked`, there is room beside them."""
-    set_limits = panel.set_ylim if direction == "y" else panel.set_xlim
-    if axis.linear_below:
-        _symmetrical(panel, direction, axis, unit)
-    elif is_logarithmic(axis, values):
-        # Numbers side by side need more room.
-        mark_powers(panel, direction, wide=40.0 if direction == "x" else 200.0)
-        positive = values[np.isfinite(values) & (values > 0.0)]
-        if direction == "y":
-            panel.yaxis.set_minor_locator(NullLocator())
-            top = positive.max()
-            set_limits(max(0.5 * np.percentile(positive, 0.5), top * 10.0**-_DECADES), 2.0 * top)
-        else:
-            margin = (positive.max() / positive.min()) ** _BESIDE if marked else 1.0
-            set_limits(positive.min() / margin, positive.max() * margin)
-    elif axis.extent:
-        keep_flat(panel, unit.factor * axis.extent, direction)
-    if axis.low is not None:
-        set_limits(unit.factor * axis.low, None)
-    if axis.high is not None:
-        set_limits(None, unit.factor * axis.high)
-    if axis.ticks:
-        (panel.set_yticks if direction == "y" else panel.set_xticks)(unit.factor * np.asarray(axis.ticks))
-    if axis.zero:
-        (panel.axhline if direction == "y" else panel.axvline)(0.0, **ZERO)
-
-
-def _symmetrical(panel: Axes, direction: str, axis: Axis, unit: DisplayUnit) -> None:
-    """Make an axis linear below a magnitude and logarithmic beyond it."""
-    own, set_scale = (panel.yaxis, panel.set_yscale) if direction == "y" else (panel.xaxis, panel.set_xscale)
-    set_scale("symlog", linthresh=axis.linear_below * unit.factor, linscale=0.5)
-    own.set_major_locator(FixedLocator((unit.factor * symmetrical_numbers(axis)).tolist()))
-    own.set_major_formatter(FuncFormatter(lambda value, _: logarithmic_number(value)))
-
-
 def _plane(cell: _Cell, time: Any, most: int) -> Figure:
     """Draw the only panel of a figure, with equal scales and a margin, and a minimum size for a line or a point."""
-    figure, axes = panel_grid(1, 1, width=ONE_COLUMN)
+    figure, axes = panels(1, 1, width=ONE_COLUMN)
     panel: Axes = axes[0, 0]
     panel.set_aspect("equal")
     _draw(panel, cell, time, most)

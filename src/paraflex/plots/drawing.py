@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -13,26 +14,33 @@ from matplotlib.colors import to_rgba
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Polygon
-from numpy.typing import NDArray
 
 from paraflex.errors import InputError
 from paraflex.figures.shapes import figure_of
 from paraflex.formatting import number
 from paraflex.plots.given import drawn
 from paraflex.plots.labels import plain
-from paraflex.plots.layout import MM, page_width
+from paraflex.plots.layout import MM, TWO_COLUMNS, page_width
 from paraflex.plots.marks import LOOKS, by_look, key_arrow, moving_marks, still_marks
-from paraflex.plots.scene import Limits, Scene, default_magnification, is_plate, run_times, scale_bar, scene, select
+from paraflex.plots.scene import (
+    Limits,
+    Scene,
+    common_limits,
+    default_magnification,
+    is_plate,
+    run_times,
+    scale_bar,
+    scene,
+    select,
+)
 from paraflex.plots.themes import Theme, theme
-
-Array = NDArray[np.float64]
 
 # Largest number of bodies whose names fit under a picture.
 _MOST_NAMED = 9
-# Room above and below a drawing [mm].
-_HEAD, _FOOT = 5.0, 5.5
-
-
+# Room above and below a drawing, and above a panel of several [mm].
+_HEAD, _FOOT, _PANEL_HEAD = 5.0, 5.5, 4.5
+# Smallest and largest ratio of height to width of a panel, and the largest of one that is as wide as the page.
+_FLATTEST, _TALLEST, _TALLEST_ALONE = 0.4, 1.6, 0.6
 # Width of links [pt], and diameters of a body at a single place, a pin and the end-effector.
 _LINK, _DOT, PIN_SIZE, _TIP = 3.4, 7.0, 5.4, 4.2
 # Shortest line as a share of the picture: Agg draws no line of zero length, nor one that it snaps to a single pixel.
@@ -132,6 +140,46 @@ def bare(axes: Axes, limits: Limits) -> Axes:
     axes.set_ylim(limits.bottom, limits.top)
     axes.set_axis_off()
     return axes
+
+
+def pictures(
+    rows: Mapping[str, Sequence[tuple[Scene, str]]], look: Theme, columns: int, width: float
+) -> tuple[Figure, Limits]:
+    """Draw the last time of scenes side by side, with the links of earlier times pale; return figure and limits.
+
+    Parameters
+    ----------
+    rows : mapping of str to sequence of (Scene, str)
+        Scenes with their titles, by the heading above them; an empty heading takes no room.
+    look : Theme
+        Colours.
+    columns : int
+        Number of panels side by side.
+    width : float
+        Width of links relative to that in a film.
+    """
+    shown = [one for row in rows.values() for one, _ in row]
+    limits, aspect = common_limits(shown).filling(_FLATTEST, _TALLEST if columns > 1 else _TALLEST_ALONE)
+    page = page_width(TWO_COLUMNS)
+    tall = page / columns * aspect
+    lines = {heading: -(-len(row) // columns) for heading, row in rows.items()}
+    top = height = sum(count * (tall + _PANEL_HEAD) + (_HEAD if heading else 0.0) for heading, count in lines.items())
+    figure = Figure(figsize=(page * MM, height * MM), facecolor=look.ground)
+    for heading, row in rows.items():
+        if heading:
+            figure.text(0.01, (top - 0.8) / height, heading, va="top", fontsize=8.0, color=look.ink, fontweight="bold")
+            top -= _HEAD
+        for k, (one, title) in enumerate(row):
+            line, column = divmod(k, columns)
+            bottom = (top - (line + 1) * (tall + _PANEL_HEAD)) / height
+            axes = bare(figure.add_axes((column / columns, bottom, 1.0 / columns, tall / height)), limits)
+            for places in one.bodies.values():
+                for earlier in places[:-1]:
+                    axes.plot(*earlier.T, color=look.faint, linewidth=0.7, zorder=1.0, clip_on=False)
+            Sketch(axes, one, limits, look, width).show(one.time.size - 1)
+            axes.set_title(title, fontsize=8.0, color=look.ink, pad=1.0)
+        top -= lines[heading] * (tall + _PANEL_HEAD)
+    return figure, limits
 
 
 def draw_scale_bar(

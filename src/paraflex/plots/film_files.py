@@ -8,7 +8,6 @@ import subprocess
 import tempfile
 from collections.abc import Callable, Iterator
 from contextlib import suppress
-from dataclasses import replace
 from html import escape
 from io import StringIO
 from pathlib import Path
@@ -24,7 +23,6 @@ from paraflex.interrupts import starting_processes
 from paraflex.plots.drawing import caption
 from paraflex.plots.film_pictures import Film, clock, frames, stage
 from paraflex.plots.labels import plain
-from paraflex.plots.scene import at_times
 from paraflex.plots.style import journal_style
 from paraflex.plots.svg import Pen, animated, moving_elements
 
@@ -46,15 +44,13 @@ def write_film(film: Film, kind: str, file: Path, report: Report) -> None:
         _write_mp4(film, file, find_encoder(), report)
     elif kind == ".gif":
         _write_gif(film, file, report)
-    elif kind == ".png":
-        still = next(frames(film, len(film.time) - 1))
-        Image.fromarray(still).convert("RGB").save(file, format="PNG")
-        report(1, 1)
     else:
-        digits = max(4, len(str(len(film.time))))
-        for i, frame in enumerate(frames(film), 1):
-            Image.fromarray(frame).convert("RGB").save(file / f"frame_{i:0{digits}d}.png")
-            report(i, len(film.time))
+        count, digits = len(film.time), max(4, len(str(len(film.time))))
+        numbers = range(count) if kind == "" else [count - 1]
+        for i, frame in enumerate(frames(film, numbers), 1):
+            target = file / f"frame_{i:0{digits}d}.png" if kind == "" else file
+            Image.fromarray(frame).convert("RGB").save(target, format="PNG")
+            report(i, len(numbers))
 
 
 def find_encoder() -> str:
@@ -89,8 +85,8 @@ def _animated_svg(film: Film) -> str:
         box = sketch.axes.get_position()
         scale = box.width * width / (sketch.limits.right - sketch.limits.left)
         corner = box.x0 * width - scale * sketch.limits.left, (1.0 - box.y1) * height + scale * sketch.limits.top
-        pen = Pen(corner, scale, min(box.width * width, box.height * height) / 480.0, film.look, seconds)
-        moving += moving_elements(at_times(shown, keys), sketch.limits, pen)
+        pen = Pen(corner, scale, min(box.width * width, box.height * height) / 480.0, film.look, seconds, keys)
+        moving += moving_elements(shown, sketch.limits, pen)
     named = ", ".join(plain(shown.mode) for shown in film.scenes if shown.mode)
     title = f"{film.scenes[0].mechanism}{', mode ' + named if named else ''}: {caption(film.scenes[0])}"
     # SMIL cannot display a running time; a line fills instead.
@@ -150,10 +146,8 @@ def _reduced(film: Film, report: Report) -> Iterator[Image.Image]:
 
 def _palette(film: Film) -> Image.Image:
     """Return the palette of the colours of the first, the middle and the last picture."""
-    chosen = np.array([0, len(film.time) // 2, len(film.time) - 1])
-    scenes = tuple(at_times(shown, chosen) for shown in film.scenes)
-    few = replace(film, scenes=scenes)
-    palette = Image.fromarray(np.concatenate(list(frames(few)))).convert("RGB").quantize(_GIF_COLOURS)
+    few = list(frames(film, (0, len(film.time) // 2, len(film.time) - 1)))
+    palette = Image.fromarray(np.concatenate(few)).convert("RGB").quantize(_GIF_COLOURS)
     # The background keeps its exact colour: colours near it are replaced by it.
     colours = np.array(palette.getpalette(), dtype=np.int64).reshape(-1, 3)
     ground = np.array(list(bytes.fromhex(film.look.ground[1:])))

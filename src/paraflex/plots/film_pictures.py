@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -12,6 +12,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
+from paraflex.arrays import Array
 from paraflex.plots.drawing import Sketch, bare, caption, draw_load_keys, draw_scale_bar, name_links
 from paraflex.plots.labels import plain
 from paraflex.plots.scene import Scene, common_limits
@@ -59,13 +60,13 @@ class Film:
         return caption(self.scenes[0]) + (f", speed × {self.speed:g}" if self.plays else "") + trail
 
     @property
-    def time(self) -> NDArray[np.float64]:
+    def time(self) -> Array:
         """Times of the run in the pictures [s]."""
         return self.scenes[0].time
 
 
-def frames(film: Film, start: int = 0) -> Iterator[NDArray[np.uint8]]:
-    """Yield the pictures (height, width, 4) of a film from number `start` on; fixed parts are drawn only once."""
+def frames(film: Film, numbers: Iterable[int] | None = None) -> Iterator[NDArray[np.uint8]]:
+    """Yield pictures (height, width, 4) of a film by their numbers, by default all; fixed parts are drawn only once."""
     with journal_style():
         figure, sketches, texts = stage(film)
         canvas = FigureCanvasAgg(figure)
@@ -74,7 +75,7 @@ def frames(film: Film, start: int = 0) -> Iterator[NDArray[np.uint8]]:
             artist.set_animated(True)
         canvas.draw()
         background = canvas.copy_from_bbox(figure.bbox)
-        for i in range(start, len(film.time)):
+        for i in range(len(film.time)) if numbers is None else numbers:
             time = film.time[i]
             canvas.restore_region(background)
             for sketch, text in zip(sketches, texts[:-1], strict=True):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Mapping
-from functools import cache, partial, wraps
+from functools import wraps
 from inspect import signature
 from pathlib import Path
 from typing import Any, Concatenate, ParamSpec, TypeVar
@@ -21,11 +21,13 @@ from paraflex.results.kinds import kind_of, wrong_kind
 D = TypeVar("D")
 P = ParamSpec("P")
 
+_NUMBERS = "give what the study's result has as plain numbers, or the folder it was written to"
+
 
 def drawn(function: Callable[Concatenate[D, P], Figure]) -> Callable[Concatenate[D | str | Path, P], Figure]:
     """Decorate a plotting function: it draws in the common style and accepts results or their folder or file."""
     take: Callable[..., Figure] = checked_arguments(
-        figures="give what the study's result has as plain numbers, or the folder it was written to",
+        figures=_NUMBERS,
         table="give the folder of a study of many runs",
     )(function)
 
@@ -35,23 +37,18 @@ def drawn(function: Callable[Concatenate[D, P], Figure]) -> Callable[Concatenate
     def draw_results(*args: Any, **kwargs: Any) -> Figure:
         data: Any = args[0] if args else kwargs.pop(first, None)
         if isinstance(data, str | os.PathLike | xr.Dataset):
-            data = _of_a_kind(data, _kinds()[function.__name__])
-        with journal_style():
-            return _drawn(data, first, partial(take, data, *args[1:], **kwargs))
+            listed = ((kind, one) for kind, figures in CATALOGUE.items() for one in figures)
+            data = _of_a_kind(data, {kind: one.takes for kind, one in listed if one.name == function.__name__})
+        try:
+            with journal_style():
+                return take(data, *args[1:], **kwargs)
+        except KeyError as error:
+            if isinstance(data, Mapping) and not isinstance(data, xr.Dataset) and error.args[0] not in data:
+                raise InputError(f'lacks "{error.args[0]}"', field=first, remedy=_NUMBERS) from error
+            raise
 
     draw_results.__doc__ = f"{function.__doc__}\n\nWhat all figures take and refuse: see `paraflex.plots`."
     return draw_results
-
-
-def _drawn(data: Any, field: str, draw: Callable[[], Figure]) -> Figure:
-    """Draw a figure; raise InputError if plain numbers lack an entry that it needs."""
-    try:
-        return draw()
-    except KeyError as error:
-        if isinstance(data, Mapping) and not isinstance(data, xr.Dataset) and error.args[0] not in data:
-            remedy = "give what the study's result has as plain numbers, or the folder it was written to"
-            raise InputError(f'lacks "{error.args[0]}"', field=field, remedy=remedy) from error
-        raise
 
 
 def _of_a_kind(data: Any, kinds: Mapping[str, str]) -> Any:
@@ -69,13 +66,3 @@ def _of_a_kind(data: Any, kinds: Mapping[str, str]) -> Any:
     if source.kind not in kinds:
         raise wrong_kind(source.kind, kinds, str(data))
     return source.designs if kinds[source.kind] == "designs" else source.data
-
-
-@cache
-def _kinds() -> dict[str, dict[str, str]]:
-    """Return for every figure the kinds of its results, each with the part that its function takes."""
-    found: dict[str, dict[str, str]] = {}
-    for kind, figures in CATALOGUE.items():
-        for figure in figures:
-            found.setdefault(figure.name, {})[kind] = figure.takes
-    return found

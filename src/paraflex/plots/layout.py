@@ -34,6 +34,8 @@ _PAGE, _LOWEST = 225.0, 9.0
 # Margin around a plane as a share of its size, smallest and largest ratio of a panel's height to its width, and the
 # largest for a figure of two columns.
 _MARGIN, _FLATTEST, _TALLEST, _TALLEST_WIDE = 0.06, 0.3, 1.3, 0.75
+# Extent of a plane below which it is that of a point, as a share of the distance from the origin.
+_AT_REST = 1e-9
 # Room for the parts around a panel [mm].
 _EDGE = 1.0
 _LEGEND_LINE = 4.2
@@ -83,19 +85,14 @@ def is_narrow(width: float = TWO_COLUMNS) -> bool:
     return page_width(width) < 0.75 * TWO_COLUMNS
 
 
-def panels(rows: int, columns: int, *, width: float = TWO_COLUMNS) -> tuple[Figure, NDArray[Any]]:
-    """Create a figure of a width [mm] and its axes (rows, columns), to be placed by `lay_out`.
+def panels(count: int, columns: int, *, width: float = TWO_COLUMNS) -> tuple[Figure, NDArray[Any]]:
+    """Create a figure of a width [mm] with `count` panels in rows of `columns`, to be placed by `lay_out`.
 
-    A width set by `column_width` takes precedence.
+    They are the first ones of `axes.flat`; the others are hidden. A width set by `column_width` takes precedence.
     """
     width = page_width(width)
     figure = Figure(figsize=(width * MM, width * MM))
-    return figure, figure.subplots(rows, columns, squeeze=False)
-
-
-def panel_grid(count: int, columns: int, *, width: float = TWO_COLUMNS) -> tuple[Figure, NDArray[Any]]:
-    """Create `count` panels in rows of `columns`, the first ones of `axes.flat`; the others are hidden."""
-    figure, axes = panels(-(-count // columns), columns, width=width)
+    axes = figure.subplots(-(-count // columns), columns, squeeze=False)
     for panel in axes.flat[count:]:
         panel.set_visible(False)
     return figure, axes
@@ -185,23 +182,20 @@ def lay_out(figure: Figure, axes: NDArray[Any], *, panel_height: float) -> Figur
     return figure
 
 
-def equal_scales_height(figure: Figure, panel: Axes) -> float:
-    """Return the height [mm] at which the only panel of a figure has equal scales on both axes and fills its width."""
-    (left, right), (bottom, top) = panel.get_xlim(), panel.get_ylim()
-    _, _, width = _columns(np.array([[panel]]), figure.get_figwidth() / MM)
-    return width * (top - bottom) / (right - left)
-
-
 def finish_plane(figure: Figure, axes: Axes) -> Figure:
     """Set the limits of the only panel, with a margin and a least size for a line or point, and lay out the figure."""
     box = axes.dataLim
     width, height = ((1.0 + 2.0 * _MARGIN) * extent for extent in (box.width, box.height))
-    width = max(width, height / (_TALLEST if is_narrow(ONE_COLUMN) else _TALLEST_WIDE)) or 1.0
+    width = max(width, height / (_TALLEST if is_narrow(ONE_COLUMN) else _TALLEST_WIDE))
+    # A point at rest moves by rounding errors.
+    width = width if width > _AT_REST * np.max(np.abs(box.get_points())) else 1.0
     height = max(height, _FLATTEST * width)
     middle_x, middle_y = box.x0 + 0.5 * box.width, box.y0 + 0.5 * box.height
     axes.set_xlim(middle_x - 0.5 * width, middle_x + 0.5 * width)
     axes.set_ylim(middle_y - 0.5 * height, middle_y + 0.5 * height)
-    return lay_out(figure, np.array([[axes]]), panel_height=equal_scales_height(figure, axes))
+    # The panel has equal scales on both axes and fills the width of the figure.
+    only = np.array([[axes]])
+    return lay_out(figure, only, panel_height=_columns(only, figure_width(axes))[2] * height / width)
 
 
 def _rows(

@@ -11,16 +11,14 @@ from matplotlib.colors import ListedColormap, LogNorm, Normalize
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, MaxNLocator
 from matplotlib.tri import Triangulation
-from numpy.typing import NDArray
 
+from paraflex.arrays import Array
 from paraflex.errors import InputError
 from paraflex.figures.designs import DesignTable
 from paraflex.formatting import logarithmic_number, peak
 from paraflex.plots.given import drawn
 from paraflex.plots.labels import mathematics
 from paraflex.plots.layout import ONE_COLUMN, TWO_COLUMNS, is_narrow, lay_out, panels
-
-Array = NDArray[np.float64]
 
 # Largest number of panels, approximate number of contour lines of a panel, and shades between two lines.
 _MOST_METRICS, _LINES, _BETWEEN = 3, 7, 4
@@ -52,8 +50,8 @@ def response_map(table: DesignTable, metrics: Sequence[str] | None = None) -> Fi
             remedy="vary two of them, or draw response_curves",
         )  # fmt: skip
     chosen = table.judged_by(metrics, 1)[:_MOST_METRICS]
-    shape = (len(chosen), 1) if is_narrow() else (1, len(chosen))
-    figure, axes = panels(*shape, width=ONE_COLUMN if len(chosen) == 1 else TWO_COLUMNS)
+    columns = 1 if is_narrow() else len(chosen)
+    figure, axes = panels(len(chosen), columns, width=ONE_COLUMN if len(chosen) == 1 else TWO_COLUMNS)
     for panel, metric in zip(axes.flat, chosen, strict=True):
         shown = [(series[0].column(name), *table.labelled(name)) for name in (*names[:2], metric)]
         _draw_map(panel, *(factor * values for values, _, factor in shown))

@@ -6,11 +6,9 @@ from collections.abc import Callable, Sequence
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from paraflex.arrays import Array
 from paraflex.plots.scene import ARROW, BLOCK, TURN, DrawnJoint, DrawnLoad, Limits, Scene
-
-Array = NDArray[np.float64]
 
 # Sizes as shares of the picture's larger side.
 PIN, TRIANGLE, RAIL, MOTOR = 0.008, 0.028, 0.02, 0.0125
@@ -108,12 +106,6 @@ def is_guide(joint: DrawnJoint, limits: Limits) -> bool:
     return len(joint.place) > 1 and bool(np.max(np.ptp(joint.place, axis=0)) <= _STILL_SHARE * limits.size)
 
 
-def triangle(place: Array, limits: Limits) -> Array:
-    """Return the closed triangle (4, 2) of a support under a point."""
-    d = TRIANGLE * limits.size
-    return place + d * np.array([[0.0, 0.0], [-0.6, -1.0], [0.6, -1.0], [0.0, 0.0]])
-
-
 def hatching(start: Array, end: Array, limits: Limits) -> Array:
     """Return strokes (n, 2, 2) of ground on the right of a line from start to end."""
     d = 0.45 * RAIL * limits.size
@@ -127,7 +119,8 @@ def hatching(start: Array, end: Array, limits: Limits) -> Array:
 
 def support(place: Array, limits: Limits) -> tuple[list[Array], Array]:
     """Return the lines of a support under a point, and the hatching (n, 2, 2) of its ground."""
-    held, wide = triangle(place, limits), 0.35 * TRIANGLE * limits.size
+    d, wide = TRIANGLE * limits.size, 0.35 * TRIANGLE * limits.size
+    held = place + d * np.array([[0.0, 0.0], [-0.6, -1.0], [0.6, -1.0], [0.0, 0.0]])
     base = np.array([held[1] - [wide, 0.0], held[2] + [wide, 0.0]])
     return [held, base], hatching(base[0], base[1], limits)
 

@@ -9,25 +9,26 @@ from typing import Any
 import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
-from numpy.typing import NDArray
 
+from paraflex.arrays import Array
 from paraflex.figures.selection import names_of, samples
 from paraflex.figures.shapes import figure_of
 from paraflex.plots.drawing import Sketch
 from paraflex.plots.labels import symbol
 from paraflex.plots.marks import still_marks
-from paraflex.plots.scene import DrawnGear, DrawnJoint, Limits, Scene, limits_of, run_times, scene
+from paraflex.plots.scene import DrawnJoint, Scene, limits_of, run_times, scene
 from paraflex.plots.style import BLACK
 from paraflex.plots.themes import theme
 from paraflex.results.outlines import figure_order
-
-Points = NDArray[np.float64]
 
 POINT_STYLE: dict[str, Any] = {"linestyle": "none", "marker": "o", "markersize": 2.5, "color": BLACK, "zorder": 3.0}
 _IN_LEGEND: dict[str, Any] = {"linestyle": "none", "marker": "^", "markerfacecolor": "none", "markeredgecolor": BLACK}
 _LOOK = replace(theme("light"), ink=BLACK, earth=BLACK, links=("#737373",))
 # Millimetres per metre, and number of samples of a run from which the travel of sliding joints is found.
 _MM, _POSES = 1e3, 61
+# Variables of a scene that are lengths.
+_LENGTHS = ("shape", "shape_base", "joint_position", "joint_base", "spring_position", "gear_radius",
+            "end_effector_desired")  # fmt: skip
 # Line width relative to that of a film.
 _WIDTH = 0.68
 
@@ -35,7 +36,7 @@ _WIDTH = 0.68
 _SAME = 1e-4
 
 
-def draw_mechanism(axes: Axes, data: xr.Dataset, clear_of: Points) -> None:
+def draw_mechanism(axes: Axes, data: xr.Dataset, clear_of: Array) -> None:
     """Draw the start pose: every link, its joints, the points that do not move, and the points' names.
 
     Parameters
@@ -50,7 +51,7 @@ def draw_mechanism(axes: Axes, data: xr.Dataset, clear_of: Points) -> None:
     run = max((data.isel(mode=k) for k in range(data.sizes["mode"])), key=samples)
     if samples(run) == 0:
         return
-    places = 1e3 * run["point_position"].transpose("time", "point", "axis").values[: samples(run)]
+    places = _MM * run["point_position"].transpose("time", "point", "axis").values[: samples(run)]
     names = names_of(run, "point")
     start, size = places[0], float(np.ptp(places[0], axis=0).max())
     moves = np.ptp(places, axis=0).max(axis=1)
@@ -70,7 +71,7 @@ def draw_mechanism(axes: Axes, data: xr.Dataset, clear_of: Points) -> None:
     others = [group[0] for group in groups if group[0] not in joined]
     if others:
         axes.plot(*start[others].T, label="other points", **POINT_STYLE)
-    taken = np.vstack([*map(_sampled, shown.bodies.values()), *grounds, clear_of])
+    taken = np.vstack([*(_sampled(figure_of(places[:1])) for places in shown.bodies.values()), *grounds, clear_of])
     taken = taken[np.isfinite(taken).all(axis=1)]
     axes.update_datalim(np.vstack([start, taken]))
     _name_points(axes, start, groups, names, taken)
@@ -78,22 +79,11 @@ def draw_mechanism(axes: Axes, data: xr.Dataset, clear_of: Points) -> None:
 
 def _of_shapes(run: xr.Dataset) -> Scene:
     """Return the scene of the start pose in mm, with rails as long as the travel of the run."""
-    shown = scene(run, np.linspace(*run_times(run), _POSES))
-    return replace(
-        shown,
-        bodies={name: _MM * figure_of(places[:1]) for name, places in shown.bodies.items()},
-        joints=tuple(
-            replace(joint, place=_MM * joint.place, rail=None if joint.rail is None else _MM * joint.rail)
-            for joint in shown.joints
-        ),
-        springs={name: _MM * ends for name, ends in shown.springs.items()},
-        gears=tuple(DrawnGear(gear.name, tuple(_MM * line for line in gear.lines)) for gear in shown.gears),
-        anchors=tuple(_MM * place for place in shown.anchors),
-        trail=None, desired=None, loads=(), limits=Limits(*(_MM * side for side in shown.limits)),
-    )  # fmt: skip
+    in_mm = run.assign({name: _MM * run[name].astype(float) for name in _LENGTHS if name in run})
+    return replace(scene(in_mm, np.linspace(*run_times(run), _POSES)), trail=None, desired=None, loads=())
 
 
-def _scene(points: Points, names: list[str], joints: tuple[DrawnJoint, ...]) -> Scene:
+def _scene(points: Array, names: list[str], joints: tuple[DrawnJoint, ...]) -> Scene:
     """Return a scene whose bodies are the figures formed by their points, at one time."""
     bodies: dict[str, list[int]] = {}
     for k, name in enumerate(names):
@@ -105,13 +95,13 @@ def _scene(points: Points, names: list[str], joints: tuple[DrawnJoint, ...]) -> 
     )  # fmt: skip
 
 
-def _sampled(outline: Points) -> Points:
+def _sampled(outline: Array) -> Array:
     """Return closely spaced points along a line (1, s, 2)."""
     share = np.linspace(0.0, 1.0, 25)[:, None]
     return np.vstack([a + share * (b - a) for a, b in pairwise(outline[0])] + [outline[0, :1]])
 
 
-def _coincident(points: Points, size: float) -> list[list[int]]:
+def _coincident(points: Array, size: float) -> list[list[int]]:
     """Return the indices of points, grouped by position."""
     groups: dict[int, list[int]] = {}
     for k, point in enumerate(points):
@@ -120,7 +110,7 @@ def _coincident(points: Points, size: float) -> list[list[int]]:
     return list(groups.values())
 
 
-def _name_points(axes: Axes, points: Points, groups: list[list[int]], names: list[str], taken: Points) -> None:
+def _name_points(axes: Axes, points: Array, groups: list[list[int]], names: list[str], taken: Array) -> None:
     """Write names beside points, each on the side with most room; coincident points share a text."""
     size = float(np.ptp(points, axis=0).max())
     angles = np.linspace(0.0, 2.0 * np.pi, 24, endpoint=False)

@@ -41,9 +41,10 @@ def freedoms(mechanism: Mechanism) -> int:
 def _counts(mechanism: Mechanism) -> list[tuple[str, Any]]:
     units = mechanism.motor_units()
     effector = mechanism.end_effector
+    flexible = sum(bool(getattr(body, "flexible", False)) for body in mechanism.bodies)
     motors = [f"{motor.name} at {motor.joint} [{unit}]" for motor, unit in zip(mechanism.motors, units, strict=True)]
     return [
-        ("bodies", _counted(mechanism)),
+        ("bodies", f"{len(mechanism.bodies)}, {flexible} of them flexible"),
         ("joints", len(mechanism.joints)),
         ("closed loops", len(loops(mechanism))),
         ("degrees of freedom (Grübler)", freedoms(mechanism)),
@@ -58,11 +59,6 @@ def _counts(mechanism: Mechanism) -> list[tuple[str, Any]]:
             if members and group.table not in _LISTED_GROUPS
         ),
     ]
-
-
-def _counted(mechanism: Mechanism) -> str:
-    flexible = sum(bool(getattr(body, "flexible", False)) for body in mechanism.bodies)
-    return f"{len(mechanism.bodies)}, {flexible} of them flexible"
 
 
 def _few(what: str, headings: tuple[str, ...], rows: list[tuple]) -> str:

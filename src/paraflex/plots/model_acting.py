@@ -5,15 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from paraflex.arrays import Array
 from paraflex.plots.marks import round_arrow, straight_arrow
 from paraflex.plots.scene import ARROW, BLOCK, TURN, DrawnJoint, Limits, Scene
 from paraflex.plots.signs import Arrow
 from paraflex.results.acting import ActingLoad, acting_load
 from paraflex.results.posed import Posed
-
-Array = NDArray[np.float64]
 
 # Length of the shortest arrow of a load relative to that of the largest.
 _SHORTEST = 0.35

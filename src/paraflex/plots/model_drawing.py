@@ -10,9 +10,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import FancyArrowPatch
-from numpy.typing import NDArray
 
-from paraflex.figures.shapes import figure_of
+from paraflex.arrays import Array
+from paraflex.figures.shapes import along, figure_of
 from paraflex.formatting import number as number_text, printable
 from paraflex.mechanism import GROUND, Mechanism
 from paraflex.plots.drawing import Sketch
@@ -26,8 +26,6 @@ from paraflex.plots.signs import arrow_sign, draw_arrow, joint_sign, sign_legend
 from paraflex.plots.style import journal_style
 from paraflex.plots.themes import Theme, theme
 from paraflex.results.posed import Posed
-
-Array = NDArray[np.float64]
 
 _MM_OF_POINT = 25.4 / 72.0
 # Room around the panel: left, right, below with the legend, above with the title [mm].
@@ -158,7 +156,7 @@ def _draw_path(axes: Axes, posed: Posed, look: Theme) -> list[Array]:
         return []
     axes.plot(*path[0], **_START, markeredgecolor=look.desired, zorder=3.6)
     for share in (0.2, 0.5, 0.8) if np.ptp(path, axis=0).any() else ():
-        _arrow(axes, _along(path, share - 0.01), _along(path, share + 0.01), look.desired, 8.0)
+        _arrow(axes, along(path, (share - 0.01, share + 0.01)), look.desired, 8.0)
     return [path]
 
 
@@ -198,7 +196,7 @@ def _draw_gravity(axes: Axes, mechanism: Mechanism, limits: Limits, look: Theme)
     room = _WEIGHT * limits.size
     corner = np.array([limits.right - 0.09 * (limits.right - limits.left), limits.top - 0.7 * room])
     ends = np.array([corner - 0.5 * room * weight / size, corner + 0.5 * room * weight / size])
-    _arrow(axes, ends[0], ends[1], look.earth, 11.0, 1.4)
+    _arrow(axes, ends, look.earth, 11.0, 1.4)
     axes.annotate(
         f"g = {number_text(size, 3, padded=True)} m/s²", (corner[0], corner[1]), xytext=(-6.0, 0.0),
         textcoords="offset points",
@@ -214,8 +212,8 @@ def _draw_gaps(axes: Axes, posed: Posed) -> None:
         if joint.name in posed.gaps:
             ends = np.array([posed.place(joint.a), posed.place(joint.b)])
             if joint.slides:
-                along = np.array([np.cos(direction), np.sin(direction)])
-                ends[0] += along * np.dot(ends[1] - ends[0], along)
+                axis = np.array([np.cos(direction), np.sin(direction)])
+                ends[0] += axis * np.dot(ends[1] - ends[0], axis)
             axes.plot(*ends.T, **_GAP, zorder=4.5)
 
 
@@ -227,15 +225,8 @@ def _body_names(shown: Scene, look: Theme) -> list[Name]:
         line = figure_of(places)[0]
         line = line[np.isfinite(line).all(axis=1)]
         if len(line):
-            along = [_along(line, share) for share in (0.5, 0.35, 0.65, 0.22, 0.78)] if len(line) > 1 else line
-            names.append(Name(body, np.array(along), look.link(number), bold=True))
+            names.append(Name(body, along(line, (0.5, 0.35, 0.65, 0.22, 0.78)), look.link(number), bold=True))
     return names
-
-
-def _along(line: Array, share: float) -> Array:
-    """Return the point at a share of a line's length."""
-    travelled = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(line, axis=0), axis=1))])
-    return np.array([np.interp(share * travelled[-1], travelled, line[:, k]) for k in range(2)])
 
 
 def _joint_names(posed: Posed, shown: Scene, look: Theme) -> list[Name]:
@@ -267,12 +258,10 @@ def _other_names(posed: Posed, shown: Scene, limits: Limits, look: Theme) -> lis
         ref = mechanism.end_effector.point
         names.append(Name(f"end-effector {ref}", shown.trail[:1], look.trail, bold=True))
     if posed.desired is not None:
-        corners = np.array([_along(posed.desired, share) for share in (0.3, 0.6, 0.85, 0.05)])
-        names.append(Name(f"path {posed.path}", corners, look.desired))
+        names.append(Name(f"path {posed.path}", along(posed.desired, (0.3, 0.6, 0.85, 0.05)), look.desired))
     names += [Name(f"spring {name}", ends[0].mean(axis=0)[None], look.earth) for name, ends in shown.springs.items()]
     for gear in shown.gears:
-        line = gear.lines[0][0]
-        names.append(Name(f"gear {gear.name}", np.array([_along(line, s) for s in (0.5, 0.25, 0.75)]), look.earth))
+        names.append(Name(f"gear {gear.name}", along(gear.lines[0][0], (0.5, 0.25, 0.75)), look.earth))
     held = [joint.place[0] for joint in shown.joints]
     for name, place in mechanism.ground.items():
         if all(np.linalg.norm(np.subtract(place, at)) > 1e-6 * limits.size for at in held):
@@ -289,8 +278,8 @@ def _acting_names(acting: Acting, sensors: list[SensorMark], look: Theme) -> lis
     return loads + marked
 
 
-def _arrow(axes: Axes, tail: Any, head: Any, colour: str, scale: float, width: float = 1.0) -> None:
-    arrow = FancyArrowPatch(tuple(tail), tuple(head), arrowstyle="-|>", mutation_scale=scale, shrinkA=0.0, shrinkB=0.0)
+def _arrow(axes: Axes, ends: Array, colour: str, scale: float, width: float = 1.0) -> None:
+    arrow = FancyArrowPatch(*map(tuple, ends), arrowstyle="-|>", mutation_scale=scale, shrinkA=0.0, shrinkB=0.0)
     arrow.set(color=colour, linewidth=width, zorder=3.7)
     axes.add_patch(arrow)
 

@@ -6,16 +6,14 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from paraflex.arrays import Array
 from paraflex.mechanism import GROUND, AssumedModesBeam, FlexibleBeam
 from paraflex.mechanism.sensors import Location, Sensor
 from paraflex.plots.marks import round_arrow, straight_arrow
 from paraflex.plots.scene import Limits
 from paraflex.plots.signs import Arrow
 from paraflex.results.posed import Posed
-
-Array = NDArray[np.float64]
 
 # Look of a sensor's mark.
 SENSOR: dict[str, Any] = {"marker": "D", "markersize": 3.6, "markeredgewidth": 1.0, "linestyle": "none"}
@@ -42,7 +40,7 @@ def sensor_marks(posed: Posed, limits: Limits) -> list[SensorMark]:
 
 
 def _mark(posed: Posed, sensor: Sensor, limits: Limits) -> SensorMark:
-    place, axis = _place(posed, sensor.location), _axis(posed, sensor.location)
+    place, axis = _place_and_axis(posed, sensor.location)
     if axis is None:
         line, head = round_arrow(place[None], _RADIUS * limits.size, _FROM, np.array([_BY]), limits, _HEAD)
     else:
@@ -51,27 +49,26 @@ def _mark(posed: Posed, sensor: Sensor, limits: Limits) -> SensorMark:
     return SensorMark(sensor.kind.replace("_", " "), sensor.name, place, arrow)
 
 
-def _place(posed: Posed, location: Location) -> Array:
-    """Return the position (2,) of a sensor; NaN if it is unknown."""
+def _place_and_axis(posed: Posed, location: Location) -> tuple[Array, Array | None]:
+    """Return the position (2,) of a sensor and the unit vector along which it measures.
+
+    The position is NaN if it is unknown; the vector is None if an angle or a moment is measured.
+    """
+    along = None
     if location.at is not None:
-        return _along_beam(posed, location)[0]
-    if location.point is not None:
-        return posed.place(location.point)
-    joint = [one.name for one in posed.mechanism.joints].index(location.joint)
-    return posed.data["joint_position"].values[0, joint].astype(float)
-
-
-def _axis(posed: Posed, location: Location) -> Array | None:
-    """Return the unit vector along which a sensor measures; None if it measures an angle or a moment."""
+        place, along = _along_beam(posed, location)
+    elif location.point is not None:
+        place = posed.place(location.point)
+    else:
+        joint = [one.name for one in posed.mechanism.joints].index(location.joint)
+        place = posed.data["joint_position"].values[0, joint].astype(float)
+        direction = float(posed.data["joint_direction"].values[0, joint])
+        along = _turned((1.0, 0.0), direction) if np.isfinite(direction) else None
     if location.axis is None:
-        return None
-    if location.axis != "own":
-        return _turned(location.axis, 0.0 if location.frame == GROUND else posed.angles[location.frame])
-    if location.at is not None:
-        return _along_beam(posed, location)[1]
-    joint = [one.name for one in posed.mechanism.joints].index(location.joint)
-    direction = float(posed.data["joint_direction"].values[0, joint])
-    return _turned((1.0, 0.0), direction) if np.isfinite(direction) else None
+        return place, None
+    if location.axis == "own":
+        return place, along
+    return place, _turned(location.axis, 0.0 if location.frame == GROUND else posed.angles[location.frame])
 
 
 def _along_beam(posed: Posed, location: Location) -> tuple[Array, Array]:

@@ -9,7 +9,8 @@ import numpy as np
 from matplotlib.axes import Axes
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from paraflex.arrays import Array
+from paraflex.figures.shapes import along, travelled
 
 # Widths of a regular and of a bold letter, and height of a line, in font sizes.
 _LETTER, _BOLD, _LINE = 0.62, 0.69, 1.3
@@ -90,10 +91,8 @@ def _sampled(line: Array) -> Array:
     line = line[np.isfinite(line).all(axis=1)]
     if len(line) < 2:
         return line
-    steps = np.linalg.norm(np.diff(line, axis=0), axis=1)
-    travelled = np.concatenate([[0.0], np.cumsum(steps)])
-    at = np.linspace(0.0, travelled[-1], min(max(2, int(travelled[-1] / _STEP)), 2000))
-    return np.column_stack([np.interp(at, travelled, line[:, k]) for k in range(2)])
+    count = min(max(2, int(travelled(line)[-1] / _STEP)), 2000)
+    return along(line, np.linspace(0.0, 1.0, count))
 
 
 def _write(axes: Axes, name: Name, centre: Array, leads_to: Array | None, size: float) -> None:

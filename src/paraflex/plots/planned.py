@@ -49,12 +49,6 @@ def _vibrates(found: Any) -> bool:
     return any(True for _ in drawn_modes(found, rigid=False))
 
 
-# Conditions on the results for a figure, in addition to its variables.
-_DRAWABLE: Mapping[str, Callable[[Any], bool]] = {
-    "mode_shapes": _vibrates,
-}
-
-
 def figures_of(source: Source, *, written: bool = False) -> list[CatalogueFigure]:
     """Return the figures that can be drawn of some results; only those that their command writes if `written`."""
     figures = (one for one in CATALOGUE[source.kind] if not written or one.is_written(source.data))
@@ -116,14 +110,11 @@ def drawings(
         )  # fmt: skip
     for point in points:
         point_number(source.data, point, "--point")
+    shown: list[tuple[str, dict[str, Any]]] = [(point, {"point": point}) for point in points]
     if figure.points == "points":
-        return [_of_points(one, ",".join(points), points=list(points)) for one in figures]
-    return [_of_points(one, point, point=point) for one in figures for point in points]
-
-
-def _of_points(planned: PlannedFigure, named: str, **points: Any) -> PlannedFigure:
-    of = f"{planned.of}_{named}" if planned.of else named
-    return PlannedFigure(planned.figure, of, partial(planned.draw, **points))
+        shown = [(",".join(points), {"points": list(points)})]
+    return [PlannedFigure(figure, "_".join(filter(None, (one.of, named))), partial(one.draw, **chosen))
+            for one in figures for named, chosen in shown]  # fmt: skip
 
 
 def _of_modes(
@@ -161,7 +152,7 @@ def _can_be_drawn(figure: CatalogueFigure, source: Source) -> bool:
         return source.designs is not None and bool(source.designs.series)
     if figure.takes == "models":
         return prototype_pair(source.data) is not None
-    return figure.can_show(source.data) and (figure.name not in _DRAWABLE or _DRAWABLE[figure.name](source.data))
+    return figure.can_show(source.data) and (figure.name != "mode_shapes" or _vibrates(source.data))
 
 
 def _chosen(source: Source, modes: Sequence[str]) -> list[str]:

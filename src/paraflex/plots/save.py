@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, TextIO
 
@@ -127,14 +127,11 @@ def write_figures(
     return [folder / file.name for file in written]
 
 
-def _write(figure: Figure, files: Iterable[Path], dpi: float | None = None) -> list[Path]:
-    written = []
+def _write(figure: Figure, files: list[Path], dpi: float | None = None) -> list[Path]:
     for path in files:
-        suffix = path.suffix[1:]
         with whole_file(path, field=str(path.parent)) as unfinished:
-            write_figure(figure, unfinished, suffix, dpi)
-        written.append(path)
-    return written
+            write_figure(figure, unfinished, path.suffix[1:], dpi)
+    return files
 
 
 def write_figure(figure: Figure, file: Path | TextIO, format_name: str, dpi: float | None = None) -> None:

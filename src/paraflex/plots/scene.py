@@ -7,21 +7,19 @@ Scenes are drawn by Matplotlib (`plots/drawing.py`), as SVG (`plots/svg.py`) and
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
+from paraflex.arrays import Array
 from paraflex.errors import InputError, suggestion
 from paraflex.figures.selection import names_of, point_number, select_run
 from paraflex.figures.shapes import figure_of
 from paraflex.folders import RESULT_KINDS
 from paraflex.formatting import display_unit, printable, quantity
 from paraflex.results.kinds import kind_of
-
-Array = NDArray[np.float64]
 
 # Variables of joints, and their counterparts for the bodies of shape_base.
 JOINT_BASES = {"joint_position": "joint_base", "joint_direction": "joint_direction_base"}
@@ -511,29 +509,6 @@ def common_limits(scenes: list[Scene]) -> Limits:
     """Return limits that contain several scenes."""
     left, right, bottom, top = np.array([one.limits for one in scenes]).T
     return Limits(float(left.min()), float(right.max()), float(bottom.min()), float(top.max()))
-
-
-def at_times(shown: Scene, chosen: NDArray[np.int64]) -> Scene:
-    """Return the scene restricted to some of its times, given by their indices."""
-    return replace(
-        shown,
-        time=shown.time[chosen],
-        bodies={name: places[chosen] for name, places in shown.bodies.items()},
-        stiff={name: places[chosen] for name, places in shown.stiff.items()},
-        joints=tuple(
-            replace(
-                joint,
-                place=joint.place[chosen],
-                direction=joint.direction[chosen],
-                rail=None if joint.rail is None else joint.rail[chosen],
-            )
-            for joint in shown.joints
-        ),
-        springs={name: ends[chosen] for name, ends in shown.springs.items()},
-        gears=tuple(DrawnGear(gear.name, tuple(line[chosen] for line in gear.lines)) for gear in shown.gears),
-        trail=None if shown.trail is None else shown.trail[chosen],
-        loads=tuple(DrawnLoad(load.name, *(each[chosen] for each in load[1:])) for load in shown.loads),
-    )
 
 
 def is_plate(places: Array) -> bool:

@@ -2,19 +2,16 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
 from contextlib import contextmanager
-from typing import Any, Literal
+from typing import Any
 
 import matplotlib.style
-from matplotlib.axes import Axes
 
 # Okabe and Ito (2008), Color Universal Design; their yellow is omitted because it is too light for a thin line.
 BLACK, BLUE, VERMILLION, GREEN = "#000000", "#0072B2", "#D55E00", "#009E73"
 COLOURS = (BLUE, VERMILLION, GREEN, BLACK, "#CC79A7", "#E69F00", "#56B4E9")
 SHADE = "0.92"
-ZERO: dict[str, Any] = {"color": "0.7", "linewidth": 0.5, "zorder": 0.5}
 
 # Fonts are those of Matplotlib, so that a figure is the same on every machine.
 STYLE: dict[str, Any] = {
@@ -59,22 +56,9 @@ STYLE: dict[str, Any] = {
     "ps.fonttype": 42,
 }
 
-# Difference, in the unit of the axis, below which data are constant up to rounding.
-_NOTHING = 1e-9
-
 
 @contextmanager
 def journal_style() -> Iterator[None]:
     """Draw in the style of this package, on Matplotlib's defaults, without reading or changing the user's settings."""
     with matplotlib.style.context(STYLE, after_reset=True):
         yield
-
-
-def keep_flat(axes: Axes, scale: float, direction: Literal["x", "y"] = "y") -> None:
-    """Set the limits of an axis so that data which vary by less than a millionth of `scale` appear constant."""
-    axis, set_limits = (axes.xaxis, axes.set_xlim) if direction == "x" else (axes.yaxis, axes.set_ylim)
-    low, high = axis.get_data_interval()
-    if not high - low > max(1e-6 * scale, _NOTHING):  # also true of axes without data
-        middle = 0.5 * (low + high) if math.isfinite(low) and max(abs(low), abs(high)) > _NOTHING else 0.0
-        half = 0.052 * scale if scale > _NOTHING else 1.04
-        set_limits(middle - half, middle + half)

@@ -5,19 +5,19 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from html import escape
+from types import EllipsisType
 
 import numpy as np
 from numpy.typing import NDArray
 
-from paraflex.figures.shapes import figure_of
+from paraflex.arrays import Array
+from paraflex.figures.shapes import figure_of, travelled
 from paraflex.formatting import printable
 from paraflex.mechanism import Mechanism
 from paraflex.plots.marks import LOOKS, Mark, moving_marks, still_marks
 from paraflex.plots.scene import Limits, Scene, is_plate, scene
 from paraflex.plots.themes import PAGE, Theme
 from paraflex.results.drawing import assembled_data
-
-Array = NDArray[np.float64]
 
 # Distance from the chord below which points of a line are omitted [pixels].
 _STRAIGHT = 0.15
@@ -43,6 +43,8 @@ class Pen:
         Colours.
     seconds : float
         Duration of the film [s]; zero (default) for a still picture.
+    keys : array of int, optional
+        Numbers of the scene's times that are shown; all by default.
     """
 
     corner: tuple[float, float]
@@ -50,10 +52,11 @@ class Pen:
     unit: float
     look: Theme
     seconds: float = 0.0
+    keys: NDArray[np.int64] | EllipsisType = ...
 
     def pixels(self, places: Array) -> Array:
-        """Return positions [m] as positions on the page [pixels]."""
-        return places * [self.scale, -self.scale] + self.corner
+        """Return positions (f, ..., 2) [m] as positions on the page at the shown times [pixels]."""
+        return places[self.keys] * [self.scale, -self.scale] + self.corner
 
 
 def sketch(mechanism: Mechanism) -> str:
@@ -138,7 +141,7 @@ def _dot(places: Array, radius: float, look: str, name: str, pen: Pen) -> str:
 def _trail(places: Array, pen: Pen) -> str:
     """Return the element of the whole trail, which is uncovered over time."""
     pixels = pen.pixels(places)
-    steps = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(pixels, axis=0), axis=1))])
+    steps = travelled(pixels)
     if steps[-1] < 0.5:
         return ""
     covered = [f"{value:.1f}" for value in steps[-1] - steps]

@@ -8,8 +8,9 @@ import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
+from paraflex.arrays import Array
+from paraflex.figures.shapes import along
 from paraflex.plots.given import drawn
 from paraflex.plots.layout import ONE_COLUMN, finish_plane, panels
 from paraflex.plots.mechanism import draw_mechanism
@@ -36,17 +37,16 @@ def desired_path(data: xr.Dataset) -> Figure:
     return finish_plane(figure, axes)
 
 
-def _draw_direction(axes: Axes, path: NDArray[np.float64]) -> None:
+def _draw_direction(axes: Axes, path: Array) -> None:
     """Draw arrow heads along a path at one, three, five and seven eighths of its length."""
-    travelled = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(path, axis=0), axis=1))])
-    if travelled[-1] == 0.0:
+    if not np.ptp(path, axis=0).any():
         return
     for share in (0.125, 0.375, 0.625, 0.875):
-        ends = [np.interp((share + d) * travelled[-1], travelled, path[:, k]) for d in (-0.01, 0.01) for k in (0, 1)]
+        tail, head = along(path, (share - 0.01, share + 0.01))
         axes.annotate(
             "",
-            xytext=(ends[0], ends[1]),
-            xy=(ends[2], ends[3]),
+            xytext=tail,
+            xy=head,
             arrowprops={"arrowstyle": "-|>", "color": BLUE, "mutation_scale": 9.0, "shrinkA": 0.0, "shrinkB": 0.0},
             zorder=2.7,
         )

@@ -9,11 +9,12 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from paraflex.figures.designs import DesignTable, column_label, in_conflict, undominated
+from paraflex.figures.designs import DesignTable, column_label, fronts, in_conflict, undominated
 
-# Largest number of rows drawn and of runs in motion; numbers of the latter that are best in the first metric, and that
-# are on the front.
-MOST_ROWS, MOST_RUNS, _BEST, _FRONT = 5000, 8, 3, 2
+# Largest number of rows drawn and of runs in motion, and number of the latter that are on the front.
+MOST_ROWS, MOST_RUNS, _FRONT = 5000, 8, 2
+# Places of the runs in motion that are best in the first metric, in words.
+_PLACES = ("", ", second", ", third")
 # Number of metrics whose fronts are always kept.
 _FRONTS = 8
 
@@ -36,8 +37,8 @@ def best_runs(designs: DesignTable) -> list[Picked]:
         return []
     first, *others = judged
     why: dict[int, list[str]] = {}
-    for place, row in enumerate(_least(designs, first)[:_BEST]):
-        why.setdefault(row, []).append(f"{column_label(first)}{'' if place == 0 else f', {_nth(place + 1)}'}")
+    for place, row in enumerate(_least(designs, first)[: len(_PLACES)]):
+        why.setdefault(row, []).append(f"{column_label(first)}{_PLACES[place]}")
     best = next(iter(why))
     for name, row in _least_of_series(designs, first).items():
         if row == best:
@@ -76,17 +77,6 @@ def drawn_rows(designs: DesignTable, kept: Sequence[int], most: int = MOST_ROWS)
     return np.sort(np.concatenate([held, lot]))
 
 
-def fronts(designs: DesignTable, across: str, up: str) -> list[NDArray[np.intp]]:
-    """Return the rows of each path and mode that no other row dominates in two metrics."""
-    x, y = designs.metrics[across], designs.metrics[up]
-    out = []
-    for path, mode in designs.series:
-        own = (designs.path == path) & (designs.mode == mode) & designs.complete & np.isfinite(x) & np.isfinite(y)
-        rows = np.flatnonzero(own)
-        out.append(rows[undominated(x[rows], y[rows])])
-    return out
-
-
 def _least(designs: DesignTable, metric: str) -> list[int]:
     """Return the best row of every design, sorted by a metric, the smallest first."""
     values = np.where(designs.complete, designs.metrics[metric], np.inf)
@@ -99,29 +89,23 @@ def _least(designs: DesignTable, metric: str) -> list[int]:
 def _least_of_series(designs: DesignTable, metric: str) -> dict[str, int]:
     """Return the row with the smallest metric for each path and mode, if there are several of these."""
     out = {}
-    pairs = list(designs.series)
-    for path, mode in pairs if len(pairs) > 1 else []:
-        own = (designs.path == path) & (designs.mode == mode) & designs.complete
-        values = np.where(own, designs.metrics[metric], np.inf)
+    pairs = designs.series_rows
+    for (path, mode), rows in pairs.items() if len(pairs) > 1 else ():
+        values = designs.metrics[metric][rows]
         if np.isfinite(values).any():
             # Word joiners keep the signs of a mode on one line.
             signs = "\u2060".join(mode)
             name = signs if len({one[0] for one in pairs}) == 1 else f"{signs} {path}"
-            out[name] = int(np.nanargmin(values))
+            out[name] = int(rows[np.nanargmin(values)])
     return out
 
 
 def _knees(designs: DesignTable, across: str, up: str) -> list[int]:
     """Return the inner runs of the front nearest to the corner of both minima, in units of the front's extent."""
     x, y = (np.where(designs.complete, designs.metrics[name], np.nan) for name in (across, up))
-    known = np.flatnonzero(np.isfinite(x) & np.isfinite(y))
-    front = known[undominated(x[known], y[known])]
+    front = undominated(x, y)
     if front.size < 3:
         return []
     inner = front[1:-1]
     away = np.hypot(*((v[inner] - v[front].min()) / max(float(np.ptp(v[front])), 1e-300) for v in (x, y)))
     return [int(row) for row in inner[np.argsort(away, kind="stable")[:_FRONT]]]
-
-
-def _nth(number: int) -> str:
-    return {2: "second", 3: "third"}.get(number, f"{number}th")

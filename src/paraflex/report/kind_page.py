@@ -1,4 +1,7 @@
-"""Report of any kind of results whose charts and tables are described in `paraflex.figures`."""
+"""Report of any kind of results whose charts and tables are described in `paraflex.figures`.
+
+Reports of single kinds add to it what only they have.
+"""
 
 from __future__ import annotations
 
@@ -8,6 +11,7 @@ import xarray as xr
 
 from paraflex.arguments import checked_arguments
 from paraflex.figures.catalogue import page_panels
+from paraflex.figures.runs import thinned
 from paraflex.folders.kinds import RESULT_KINDS
 from paraflex.report.page import Page
 from paraflex.report.provenance import asked, command_line, verdict_word
@@ -23,7 +27,7 @@ def kind_page(data: xr.Dataset) -> Page:
     A module of `paraflex.figures` may define `tables(data)`, which yields tables, and `tiles(data)`, which returns the
     main numbers as name, value, and the member that they refer to.
     """
-    kind = kind_of(data)
+    kind, few = kind_of(data), thinned(data)
     modules = [import_module(f"paraflex.figures.{name}") for name in RESULT_KINDS[kind].figures]
     tables = (table for module in modules if hasattr(module, "tables") for table in module.tables(data))
     return Page(
@@ -34,7 +38,7 @@ def kind_page(data: xr.Dataset) -> Page:
         command=command_line(asked(data)),
         figures=[tile for module in modules if hasattr(module, "tiles") for tile in module.tiles(data)],
         more=sections(tables),
-        panels=page_panels(kind, data),
-        time=data["time"].values if "time" in data.dims else (),
+        panels=page_panels(kind, few),
+        time=few["time"].values if "time" in few.dims else (),
         notes=finding_lines(verdict_of(data)),
     )

@@ -9,27 +9,14 @@ import numpy as np
 import xarray as xr
 
 from paraflex.arguments import checked_arguments
-from paraflex.figures.catalogue import page_panels
-from paraflex.figures.linear import tables
 from paraflex.figures.selection import default_mode, names_of
 from paraflex.formatting import number
 from paraflex.report.film import Animation, animation
+from paraflex.report.kind_page import kind_page
 from paraflex.report.page import Page
-from paraflex.report.provenance import asked, command_line
-from paraflex.report.text import sections
 from paraflex.results.kinds import check_kind
 from paraflex.results.linear_motion import DrawnMode, drawn_modes, modal_motion
-from paraflex.results.linear_summary import (
-    END_EFFECTOR,
-    HELD_WORDS,
-    about,
-    limiting_zero,
-    motors_of_mode,
-    oscillations,
-    poles_of,
-    remarks,
-    zeros_of,
-)
+from paraflex.results.linear_summary import HELD_WORDS, about, remarks
 
 # Number of frames of a period, and its duration [s].
 _FRAMES, _PERIOD = 33, 2.0
@@ -46,22 +33,19 @@ def linear_page(data: xr.Dataset) -> Page:
     # The first mode shape that vibrates with motors held, if there is one, is selected.
     mode = default_mode(data)
     wanted = [k for k, one in enumerate(drawn) if one.frequency > 0.0 and one.holding == "held" and one.mode == mode]
-    return Page(
-        title=data.attrs["mechanism"],
+    page = kind_page(data)
+    return replace(
+        page,
         kind="linear models",
         subtitle=f"Linear models {about(data)}, {data.sizes['state']} states",
-        facts=_facts(data),
-        command=command_line(asked(data)),
-        figures=_tiles(data),
-        more=sections(tables(data)),
-        panels=page_panels("linear", data),
+        facts=[*_facts(data), *page.facts],
         time=np.linspace(0.0, _PERIOD, _FRAMES),
         runs=[_name(one) for one in drawn],
         groups=list(groups.items()),
         selecting="mode shape",
         selected=wanted[0] if wanted else 0,
         film=_film(data, drawn),
-        no_film="" if drawn else "There is nothing to draw.",
+        no_film="There is nothing to draw.",
         remarks=[f"{one[0].upper()}{one[1:]}." for one in remarks(data)],
     )
 
@@ -100,24 +84,5 @@ def _facts(data: xr.Dataset) -> list[tuple[str, str]]:
 
     return [
         ("about", about(data)), ("states", str(data.sizes["state"])), ("inputs", listed("input")),
-        ("outputs", listed("output")), ("paraflex", str(data.attrs["paraflex_version"])),
+        ("outputs", listed("output")),
     ]  # fmt: skip
-
-
-def _tiles(data: xr.Dataset) -> list[tuple[str, str, str]]:
-    modes = names_of(data, "mode")
-    tiles = []
-    first = {mode: oscillations(poles_of(data, mode, "held"))[:1] for mode in modes if motors_of_mode(data, mode)}
-    known = {mode: found[0].frequency for mode, found in first.items() if found}
-    if known:
-        for words, choose in (("lowest", min), ("highest", max))[: 2 if len(known) > 1 else 1]:
-            mode = choose(known, key=lambda name: known[name])
-            tiles.append((f"{words} first frequency, motors held", f"{number(known[mode])} Hz", f"mode {mode}"))
-    limits = {mode: limiting_zero(zeros_of(data, mode, END_EFFECTOR)) for mode in modes if END_EFFECTOR in data["map"]}
-    limits = {mode: limit for mode, limit in limits.items() if limit}
-    if limits:
-        mode = min(limits, key=lambda name: limits[name])
-        tiles.append(
-            ("lowest right-half-plane zero to the end-effector", f"{number(limits[mode])} rad/s", f"mode {mode}")
-        )
-    return tiles

@@ -3,29 +3,27 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import xarray as xr
 
 from paraflex.arguments import checked_arguments
-from paraflex.figures.catalogue import page_panels
 from paraflex.figures.reduction import reduced_runs
 from paraflex.figures.run_motion import deflections_of
-from paraflex.figures.run_tables import Runs, solver_table
-from paraflex.figures.runs import thinned
-from paraflex.figures.selection import as_runs, names_of
+from paraflex.figures.run_tables import Runs, most_bent, solver_table
+from paraflex.figures.selection import as_runs, names_of, samples
 from paraflex.findings import DONE_STATUSES
 from paraflex.formatting import number, peak, quantity, text_symbol, typeset
 from paraflex.report.film import NO_SHAPES, animation
+from paraflex.report.kind_page import kind_page
 from paraflex.report.loads import load_tables, load_tiles
 from paraflex.report.page import Page
-from paraflex.report.provenance import asked, command_line, common_facts, verdict_word
+from paraflex.report.provenance import common_facts
 from paraflex.report.text import pairs, sections, table_pairs
-from paraflex.results.findings import finding_lines, finished, validity_line, validity_summary, verdict_of
+from paraflex.results.findings import finished, validity_line, validity_summary
 from paraflex.results.kinds import check_kind
 from paraflex.results.loads import load_figures
-
-_ALONE = ("",)
 
 
 @checked_arguments()
@@ -33,31 +31,22 @@ def motion_page(data: xr.Dataset) -> Page:
     """Return the report of a run, a dataset from `results.motion_dataset`."""
     check_kind(data, "motion")
     data = data.transpose("time", ...)
-    moving = animation(data, ())
-    few = as_runs(thinned(data))
-    status = str(data["status"].item())
-    return Page(
-        title=data.attrs["mechanism"],
+    page, status = kind_page(data), str(data["status"].item())
+    return replace(
+        page,
         kind="run",
         subtitle=_subtitle(data),
-        verdict=verdict_word(data),
         facts=common_facts(data),
-        command=command_line(asked(data)),
         figures=_figures(data),
         more=[
             *load_tables(data),
             *sections(reduced_runs(data)),
-            ("Integration", _table(data, few)),
+            ("Integration", _table(data)),
         ],
-        panels=page_panels("motion", few),
-        time=few["time"].values,
-        runs=_ALONE,
-        film=moving,
-        no_film="" if moving else NO_SHAPES,
-        notes=[
-            *([] if status == "complete" else [f"{status}: {data['message'].item()}"]),
-            *finding_lines(verdict_of(data)),
-        ],
+        runs=("",),
+        film=animation(data, ()),
+        no_film=NO_SHAPES,
+        notes=[*([] if status == "complete" else [f"{status}: {data['message'].item()}"]), *page.notes],
         remarks=list(filter(None, [validity_line({"": validity_summary(data)})])) if finished(data).all() else [],
     )
 
@@ -72,8 +61,8 @@ def _subtitle(data: xr.Dataset) -> str:
     return "; ".join(parts) or "left to its loads"
 
 
-def _table(data: xr.Dataset, run: xr.Dataset) -> str:
-    facts = [("status", str(data["status"].item())), *table_pairs(solver_table(Runs({"": run})))]
+def _table(data: xr.Dataset) -> str:
+    facts = [("status", str(data["status"].item())), *table_pairs(solver_table(Runs({"": as_runs(data)})))]
     facts += [(f"torque of {text_symbol(str(name))}", _torque(data["applied_torque"].sel(motor=name)))
               for name in data["motor"].values]  # fmt: skip
     passed = json.loads(data.attrs.get("singular_positions", "[]"))
@@ -91,15 +80,11 @@ def _torque(values: xr.DataArray) -> str:
 
 def _figures(data: xr.Dataset) -> list[tuple[str, str, str]]:
     tiles = load_tiles({"": load_figures(data)})
-    deflections = deflections_of(data)
-    if peak(deflections):
-        body = int(np.argmax([peak(one) for one in deflections.T]))
-        name = text_symbol(str(data["body"].values[body]))
-        tiles.append(("largest deflection", quantity(peak(deflections), "m"), name))
+    if body := most_bent(data):
+        tiles.append(("largest deflection", quantity(peak(deflections_of(data)), "m"), text_symbol(body)))
     status = str(data["status"].item())
     last = "" if status in DONE_STATUSES else "last sample "
-    reached = np.isfinite(data["angle"].values).all(axis=1)
-    end = np.max(data["time"].values[reached], initial=0.0)
+    end = data["time"].values[max(samples(data) - 1, 0)]
     ended = ("status", status, f"{last}t = {number(end)} s, computed in {number(data['wall_time'].item(), 3)} s")
     # The failure of a run comes before its numbers.
     return [ended, *tiles] if last else [*tiles, ended]

@@ -68,7 +68,8 @@ class Page:
     figures : sequence of (str, str, str)
         Tiles of the main numbers: name, value, and the member or run they refer to.
     summary, tables, more : sequence of (str, str)
-        Headings and HTML of the sections before all charts, before those over time, and after them; see `text.table`.
+        Headings and HTML of the sections before all charts, before those over time, and after them, as of
+        `text.sections`.
     survey : sequence of Panel
         Charts of all designs, before the tables.
     designs : Designs, optional
@@ -88,7 +89,7 @@ class Page:
     film : Animation, optional
         Animation of the runs.
     no_film : str
-        Reason why there is no animation.
+        Reason why there is no animation, shown if there is none.
     notes : sequence of str
         Notices at the top, such as failed runs.
     remarks : sequence of str
@@ -134,7 +135,7 @@ def render(page: Page) -> str:
         summary=_sections(page.summary),
         tables=_sections(page.tables),
         more=_sections(page.more),
-        no_film=escape(page.no_film),
+        no_film="" if page.film else escape(page.no_film),
         charts=_of_charts(page),
         no_charts="" if page.panels else "hidden",
         no_survey="" if page.survey else "hidden",

@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-import numpy as np
+from dataclasses import replace
+
 import xarray as xr
 
 from paraflex.arguments import checked_arguments
-from paraflex.figures.catalogue import page_panels
-from paraflex.figures.reduction import bound_sentences, states_text, tables
-from paraflex.figures.selection import names_of
+from paraflex.figures.reduction import bound_sentences
 from paraflex.formatting import number
+from paraflex.report.kind_page import kind_page
 from paraflex.report.page import Page
-from paraflex.report.provenance import asked, command_line
-from paraflex.report.text import sections
 from paraflex.results.kinds import check_kind
 
 
@@ -20,32 +18,16 @@ from paraflex.results.kinds import check_kind
 def reduction_page(data: xr.Dataset) -> Page:
     """Return the report of reduced models, a dataset from `results.reduction_dataset`."""
     check_kind(data, "reduction")
-    attrs = data.attrs
+    attrs, page = data.attrs, kind_page(data)
     of_full = f"{attrs['kept_states']} of {attrs['full_states']}"
-    return Page(
-        title=attrs["mechanism"],
+    return replace(
+        page,
         kind="reduced models",
         subtitle=f"{of_full} states, about {attrs['about']}",
         facts=[
             ("states", of_full), ("up to", f"{number(float(attrs['until']))} Hz"),
             ("damping ratio of responses", number(float(attrs["damping_ratio"]))),
-            ("paraflex", str(attrs["paraflex_version"])),
+            *page.facts,
         ],
-        command=command_line(asked(data)),
-        figures=_tiles(data),
-        more=sections(tables(data)),
-        panels=page_panels("reduction", data),
         remarks=list(bound_sentences(data)),
     )  # fmt: skip
-
-
-def _tiles(data: xr.Dataset) -> list[tuple[str, str, str]]:
-    """Return tiles of the largest number of states that any output needs, and of the largest error, by method."""
-    tiles = []
-    for name in names_of(data, "reduction"):
-        states, errors = (data[each].sel(reduction=name).values for each in ("states", "largest_error"))
-        tiles.append((f"states needed, {name}", states_text(float(np.max(states))), "for every mode and output"))
-        tiles.append(
-            (f"largest error, {name}", number(float(np.max(errors)), 3), f"{data.attrs['kept_states']} states")
-        )
-    return tiles

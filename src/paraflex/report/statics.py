@@ -2,29 +2,27 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
 from paraflex.arguments import checked_arguments
+from paraflex.arrays import Array
 from paraflex.figures import equilibria
-from paraflex.figures.catalogue import page_panels
 from paraflex.figures.charts import Panel
 from paraflex.figures.equilibria import quantity_word, unit_of
+from paraflex.figures.selection import names_of
 from paraflex.formatting import NO_VALUE, number, quantity, text_symbol
 from paraflex.report.film import NO_SHAPES, Animation, animation, frames_of
+from paraflex.report.kind_page import kind_page
 from paraflex.report.page import Page
-from paraflex.report.provenance import asked, command_line, verdict_word
-from paraflex.report.text import sections
-from paraflex.results.findings import finding_lines, validity_line, verdict_of
+from paraflex.results.findings import validity_line
 from paraflex.results.kinds import check_kind
 from paraflex.results.statics_data import statics_summary
 from paraflex.results.statics_steps import as_samples, step_kinds
-
-Array = NDArray[np.float64]
 
 # Duration of the animation from the first step to the last [s].
 _DURATION = 5.0
@@ -37,34 +35,29 @@ def statics_page(data: xr.Dataset) -> Page:
     """Return the report of equilibria, a dataset from `results.statics_dataset`."""
     check_kind(data, "statics")
     data = data.transpose("step", ...)
-    summary = statics_summary(data)
-    film = _film(data)
-    return Page(
-        title=data.attrs["mechanism"],
-        kind="statics",
+    summary, page = statics_summary(data), kind_page(data)
+    return replace(
+        page,
         subtitle=_subtitle(data),
-        verdict=verdict_word(data),
-        facts=[("steps", str(summary["steps"])), ("paraflex", str(data.attrs["paraflex_version"]))],
-        command=command_line(asked(data)),
+        facts=[("steps", str(summary["steps"])), *page.facts],
         figures=_tiles(data, summary),
-        more=sections(equilibria.tables(data)),
-        panels=_panels(data),
+        panels=_panels(data, page.panels),
         time=_times(data.sizes["step"]),
         runs=("",),
-        film=film,
-        no_film="" if film else NO_SHAPES,
+        film=_film(data),
+        no_film=NO_SHAPES,
         notes=[
             *([] if summary["status"] == "complete" else [f"{summary['status']}: {summary['message']}"]),
-            *finding_lines(verdict_of(data)),
+            *page.notes,
         ],
         remarks=list(filter(None, [validity_line({"": summary["validity"]}), equilibria.no_buckling(data)])),
     )
 
 
-def _panels(data: xr.Dataset) -> list[Panel]:
+def _panels(data: xr.Dataset, along: Sequence[Panel]) -> list[Panel]:
     """Return the charts along the travel and of buckling, or else of the shape."""
     buckling = list(equilibria.buckling_chart(data))
-    panels = [*page_panels("statics", data), *([Panel("Buckling", buckling)] if buckling else [])]
+    panels = [*along, *([Panel("Buckling", buckling)] if buckling else [])]
     return panels or [Panel("Shape", [equilibria.shape_chart(data)])]
 
 
@@ -86,12 +79,9 @@ def _film(data: xr.Dataset) -> Animation | None:
 
 def _subtitle(data: xr.Dataset) -> str:
     """Return a text on the coordinates that are moved, loaded and held."""
-    words = {"moved": "moved", "loaded": "loaded", "held": "held"}
-    found = {
-        word: [text_symbol(str(name)) for name, role in zip(data["named"].values, data["role"].values, strict=True)
-               if role == kind] for kind, word in words.items()
-    }  # fmt: skip
-    return "; ".join(f"{', '.join(names)} {word}" for word, names in found.items() if names) or "at rest"
+    found = {role: list(map(text_symbol, names_of(data.isel(named=data["role"].values == role), "named")))
+             for role in ("moved", "loaded", "held")}  # fmt: skip
+    return "; ".join(f"{', '.join(names)} {role}" for role, names in found.items() if names) or "at rest"
 
 
 def _tiles(data: xr.Dataset, summary: dict[str, Any]) -> list[tuple[str, str, str]]:

@@ -25,7 +25,6 @@ from paraflex.report.choice import Picked, drawn_rows
 from paraflex.report.designs import LOWER, Designs, survey
 from paraflex.report.film import animation
 from paraflex.report.page import Page
-from paraflex.report.search import search_tiles
 from paraflex.report.text import sections, table_html
 
 _NO_RUN = "None of the best designs was simulated again, so there is no animation."
@@ -226,7 +225,7 @@ def _tiles(designs: DesignTable, account: StudyAccount) -> list[tuple[str, str, 
     of = f"of {count(account.total)} runs" if account.total is not None else f"of {count(done)} runs"
     tiles = [("complete", f"{count(counts.get('complete', 0))}", ", ".join([of, *rest]))]
     if account.found.get("values"):
-        return [*search_tiles(account.found, designs.units), *tiles]
+        return [*search.tiles(account.found, designs.units), *tiles]
     for name in designs.judged[:3]:
         values = designs.metrics[name]
         known = np.flatnonzero(designs.complete & np.isfinite(values))

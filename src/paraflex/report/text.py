@@ -5,42 +5,26 @@ from __future__ import annotations
 import json
 import math
 import re
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Sequence
 from html import escape
 
-from paraflex.figures.tables import Table
+from paraflex.figures.tables import Cell, Table
 from paraflex.formatting import text_symbol, typeset
 
 _WORD_CLASS, _SORTABLE = ' class="words"', ' class="sortable"'
 
 
-def table(
-    heads: Sequence[tuple[str, str]],
-    rows: Sequence[tuple[str, Sequence[str]]],
-    *,
-    caption: str,
-    note: str = "",
-    runs: Mapping[str, int] | None = None,
-    keys: Mapping[str, Sequence[float | str | None]] | None = None,
-) -> str:
-    r"""Return an HTML table with a name before each row, which scrolls within the page if it is too wide.
+def table_html(shown: Table) -> str:
+    """Return the HTML of a table, which scrolls within the page if it is too wide.
 
-    Parameters
-    ----------
-    heads : sequence of (str, str)
-        Names and units of the columns, first that of the row names.
-    rows : sequence of (str, sequence of str)
-        Name and cells of each row; a cell of two lines is "first\nsecond".
-    caption : str
-        Caption for screen readers.
-    note : str
-        Sentence below the table.
-    runs : mapping of str to int, optional
-        Runs of the page that rows select, by the name of the row.
-    keys : mapping of str to sequence, optional
-        Sort keys of each row by its name, one for each column, first that of the row names; None is sorted last.
+    Numbers are typeset, units stand below the headings, and the first column names the rows. A row of a sortable table
+    carries its cells as keys.
     """
-    runs = runs or {}
+    heads = [(text_symbol(name), typeset(below)) for name, below in (column.head for column in shown.columns)]
+    rows = [
+        (text_symbol(name), ["\n".join(typeset(text_symbol(line)) for line in cell.split("\n")) for cell in cells])
+        for name, *cells in shown.texts()
+    ]
     # Columns that contain words instead of numbers.
     words = re.compile(r"[^\n]*?[A-Za-z]{2}")
     wordy = [k > 0 and any(words.match(cells[k - 1]) for _, cells in rows) for k in range(len(heads))]
@@ -48,26 +32,18 @@ def table(
         f'<th scope="col"{_WORD_CLASS if words else ""}>{escape(name)}{_small(unit)}</th>'
         for (name, unit), words in zip(heads, wordy, strict=True)
     )
-    body = "".join(_row(name, cells, wordy[1:], runs.get(name), keys[name] if keys else None) for name, cells in rows)
-    sortable = _SORTABLE if keys else ""
-    below = f'<p class="note">{escape(note)}</p>' if note else ""
+    keys = zip(*(column.cells for column in shown.columns), strict=True)
+    body = "".join(
+        _row(name, cells, wordy[1:], (shown.runs or {}).get(name), row if shown.sortable else None)
+        for (name, cells), row in zip(rows, keys, strict=True)
+    )
+    caption, sortable = escape(shown.title), _SORTABLE if shown.sortable else ""
+    below = f'<p class="note">{escape(shown.note)}</p>' if shown.note else ""
     return (
-        f'<div class="scroll" tabindex="0" role="region" aria-label="{escape(caption)}"><table{sortable}>'
-        f'<caption class="unseen">{escape(caption)}</caption>'
+        f'<div class="scroll" tabindex="0" role="region" aria-label="{caption}"><table{sortable}>'
+        f'<caption class="unseen">{caption}</caption>'
         f"<thead><tr>{head}</tr></thead><tbody>{body}</tbody></table></div>{below}"
     )
-
-
-def table_html(shown: Table) -> str:
-    """Return the HTML of a table, with its numbers typeset and the units below the headings."""
-    heads = [(text_symbol(name), typeset(below)) for name, below in (column.head for column in shown.columns)]
-    rows = [
-        (text_symbol(name), ["\n".join(typeset(text_symbol(line)) for line in cell.split("\n")) for cell in cells])
-        for name, *cells in shown.texts()
-    ]
-    cells = zip(*(column.cells for column in shown.columns), strict=True)
-    keys = {name: row for (name, _), row in zip(rows, cells, strict=True)} if shown.sortable else None
-    return table(heads, rows, caption=shown.title, note=shown.note, runs=shown.runs, keys=keys)  # type: ignore[arg-type]
 
 
 def table_pairs(shown: Table) -> list[tuple[str, str]]:
@@ -106,9 +82,7 @@ def _small(text: str) -> str:
     return f"<small>{escape(text)}</small>" if text else ""
 
 
-def _row(
-    name: str, cells: Sequence[str], wordy: Sequence[bool], run: int | None, keys: Sequence[float | str | None] | None
-) -> str:
+def _row(name: str, cells: Sequence[str], wordy: Sequence[bool], run: int | None, keys: Sequence[Cell] | None) -> str:
     """Return the HTML of a row; if it selects a run, its name is a button; keys are for sorting."""
     about, head = "", escape(name)
     if run is not None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,20 +11,19 @@ import xarray as xr
 from numpy.typing import NDArray
 
 from paraflex.arguments import checked_arguments
-from paraflex.figures.catalogue import page_panels
 from paraflex.figures.reduction import reduced_runs
 from paraflex.figures.run_motion import deflections_of, effort_axis
 from paraflex.figures.run_tables import Runs, after_table, result_table, solver_table
-from paraflex.figures.runs import thinned
 from paraflex.figures.selection import default_mode, names_of, samples
 from paraflex.findings import DONE_STATUSES
 from paraflex.formatting import number, peak, quantity
 from paraflex.report.film import NO_SHAPES, animation
+from paraflex.report.kind_page import kind_page
 from paraflex.report.loads import load_tables, load_tiles
 from paraflex.report.page import Page
-from paraflex.report.provenance import asked, command_line, common_facts, summary_beside, verdict_word
+from paraflex.report.provenance import asked, common_facts, summary_beside, verdict_word
 from paraflex.report.text import sections
-from paraflex.results.findings import finding_lines, finished, validity_line, validity_summary, verdict_of
+from paraflex.results.findings import finished, validity_line, validity_summary
 from paraflex.results.following import headline
 from paraflex.results.kinds import check_kind
 from paraflex.results.loads import load_figures
@@ -52,21 +52,18 @@ def tracking_page(data: xr.Dataset, failed: Mapping[str, str] | None = None) -> 
     check_kind(data, "tracking")
     data = data.transpose("mode", "time", ...)
     runs, rows = names_of(data, "mode"), Runs({"": data}, {"": list(failed or {})})
-    run = asked(data)
+    page, run = kind_page(data), asked(data)
     path = run.get("path")
     modes = f"{len(runs)} actuation modes" if len(runs) > 1 else f"actuation mode {runs[0]}"
-    moving = animation(data)
-    few = thinned(data)
     # The validity is that of complete runs only.
     whole = data.isel(mode=finished(data))
     valid = validity_line({name: validity_summary(whole.sel(mode=name)) for name in names_of(whole, "mode")})
-    return Page(
-        title=data.attrs["mechanism"],
+    return replace(
+        page,
         kind="run",
         subtitle=", ".join([f"path “{path}”", modes] if path else [modes]),
         verdict=verdict_word(data, failed or {}),
         facts=[*([("model", _model(run))] if run else []), *_after(data), *common_facts(data)],
-        command=command_line(run),
         figures=_figures(data),
         more=[
             *sections([result_table(rows), after_table(rows)]),
@@ -74,13 +71,11 @@ def tracking_page(data: xr.Dataset, failed: Mapping[str, str] | None = None) -> 
             *sections(reduced_runs(data)),
             *sections([solver_table(rows)]),
         ],
-        panels=page_panels("tracking", few),
-        time=few["time"].values,
         runs=runs,
         selected=runs.index(default_mode(data)),
-        film=moving,
-        no_film="" if moving else NO_SHAPES,
-        notes=[*_unfinished(data, failed or {}), *finding_lines(verdict_of(data))],
+        film=animation(data),
+        no_film=NO_SHAPES,
+        notes=[*_unfinished(data, failed or {}), *page.notes],
         remarks=[valid] if valid else [],
     )
 
@@ -98,23 +93,17 @@ def _figures(data: xr.Dataset) -> list[tuple[str, str, str]]:
     """Return the tiles of the main numbers; failed modes come first, and numbers are those of complete modes."""
     rms, words = headline(data)
     whole = finished(data)
-    errors_rms = np.where(whole, rms.values, np.nan)
-    several = data.sizes["mode"] > 1
-    peaks = np.where(whole, [peak(one) for one in data["torque"].values], np.nan)
+    least, effort = "least " if data.sizes["mode"] > 1 else "", effort_axis(data)
     tiles = [] if whole.all() else [_broken_off(data, whole)]
-    if np.isfinite(errors_rms).any():
-        best = int(np.nanargmin(errors_rms))
-        value = quantity(errors_rms[best], "m")
-        tiles.append((f"{'least ' if several else ''}RMS error {words}", value, _name(data, best)))
-    if np.isfinite(peaks).any():
-        least = int(np.nanargmin(peaks))
-        effort = effort_axis(data)
-        name = f"{'least ' if several else ''}peak {effort.name}"
-        tiles.append((name, quantity(peaks[least], effort.unit), _name(data, least)))
-    deflections = np.where(whole, [peak(one) for one in deflections_of(data)], np.nan)
-    if np.isfinite(deflections).any() and np.nanmax(deflections) > 0.0:
-        most = int(np.nanargmax(deflections))
-        tiles.append(("largest deflection", quantity(deflections[most], "m"), _name(data, most)))
+    for name, values, unit, choose in (
+        (f"{least}RMS error {words}", rms.values, "m", np.nanargmin),
+        (f"{least}peak {effort.name}", [peak(one) for one in data["torque"].values], effort.unit, np.nanargmin),
+        ("largest deflection", [peak(one) or np.nan for one in deflections_of(data)], "m", np.nanargmax),
+    ):
+        known = np.where(whole, values, np.nan)
+        if np.isfinite(known).any():
+            run = int(choose(known))
+            tiles.append((name, quantity(known[run], unit), _name(data, run)))
     return [*tiles, *load_tiles({name: load_figures(data.sel(mode=name)) for name in names_of(data, "mode")})]
 
 

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import xarray as xr
 
 from paraflex.arguments import checked_arguments
-from paraflex.figures.catalogue import page_panels
-from paraflex.figures.runs import thinned
 from paraflex.figures.selection import names_of
 from paraflex.figures.verification import (
     distance_table,
@@ -23,8 +22,9 @@ from paraflex.figures.verification import (
 from paraflex.findings import Finding
 from paraflex.formatting import quantity
 from paraflex.report.film import NO_SHAPES, animation
+from paraflex.report.kind_page import kind_page
 from paraflex.report.page import Page
-from paraflex.report.provenance import asked, command_line, common_facts, summary_beside, verdict_word
+from paraflex.report.provenance import asked, command_line, common_facts, summary_beside
 from paraflex.report.text import sections
 from paraflex.results.findings import finding_lines
 from paraflex.results.following import SPAN_WORDS, ErrorSpan
@@ -52,31 +52,27 @@ def verification_page(data: xr.Dataset, summary: Mapping[str, Any]) -> Page:
     check_kind(data, "verification")
     modes, models, run = names_of(data, "mode"), names_of(data, "model"), asked(data)
     names, reference = list(map(printed, models)), str(data.attrs["reference"])
-    moving = animation(data, ("mode", "model"))
-    few = thinned(data)
+    page = kind_page(data)
     extent = path_extent(data)
     own = {mode: dict(zip(names, runs_of_mode(data, m), strict=True)) for m, mode in enumerate(modes)}
     tables = [model_table(summary, mode, extent, own.get(mode)) for mode in summary["modes"]]
     for mode in summary["modes"]:
         tables += [distance_table(summary, mode, extent), *link_tables(summary, mode)]
     several = len(modes) > 1
-    return Page(
-        title=data.attrs["mechanism"],
-        kind="verification",
+    return replace(
+        page,
         subtitle=f"{len(models)} models of one mechanism, path “{run.get('path', '')}”, "
         f"reference: {printed(reference)}",
-        verdict=summary.get("verdict", {}).get("level", verdict_word(data)),
+        verdict=summary.get("verdict", {}).get("level", page.verdict),
         facts=[(name, value) for name, value in common_facts(data) if name != "integration"],
         command=command_line(_request(run, data)),
         figures=_tiles(summary, reference),
         more=sections(tables),
-        panels=page_panels("verification", few),
-        time=few["time"].values,
         runs=[f"{mode}, {name}" if several else name for mode in modes for name in names],
         selecting="model",
         selected=models.index(reference),
-        film=moving,
-        no_film="" if moving else NO_SHAPES,
+        film=animation(data, ("mode", "model")),
+        no_film=NO_SHAPES,
         notes=finding_lines(map(Finding.from_dict, summary.get("verdict", {}).get("findings", [])))
         + [
             f"Mode {name}, {printed(model)}: {one['message']}"
