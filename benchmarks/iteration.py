@@ -29,9 +29,9 @@ from paraflex.kernel.bodies import system_energy
 from paraflex.kernel.compiling import FAST_MATH
 from paraflex.kernel.constraints import constraint_values
 from paraflex.kernel.factor import factor_bodies
+from paraflex.kernel.indices import FACTOR_B, TIME
 from paraflex.kernel.linear import orient, solve_system
 from paraflex.kernel.metric import mass_norm
-from paraflex.kernel.run_state import FACTOR_B, TIME
 from paraflex.kernel.stage import equations
 from paraflex.mechanism import Geometry
 from paraflex.tracking import TrackingTask

@@ -19,7 +19,7 @@ from common import command_line, table, write_json
 from paraflex.dynamics import State, System, build_system, constant_signals, pack_signals, start_state
 from paraflex.integrators import IntegrationOptions, make_problem
 from paraflex.integrators.native import NativeRun, prepare
-from paraflex.kernel.run_state import ITERATIONS, REJECTED, STEPS
+from paraflex.kernel.indices import ITERATIONS, REJECTED, STEPS
 from paraflex.mechanism import Mechanism, Start, chain_of_segments, four_bars_in_a_row
 
 NUMBERS = (10, 20, 50, 100, 200, 500, 1000)

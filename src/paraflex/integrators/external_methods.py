@@ -32,14 +32,13 @@ class SciPyMethod(ExternalMethod):
 
     Attributes
     ----------
-    places, evaluations : int
-        Number of times within a step at which it evaluates, and evaluations per iteration (zero for explicit methods).
+    places : int
+        Number of times within a step at which it evaluates, for implicit methods once per iteration.
     """
 
     family = Family.SCIPY
     order = 5
     places: ClassVar[int]
-    evaluations: ClassVar[int]
 
 
 class RK45(SciPyMethod):
@@ -50,7 +49,6 @@ class RK45(SciPyMethod):
     source = "Dormand and Prince (1980), through SciPy"
     solver = "RK45"
     places = 5
-    evaluations = 0
     # Root y of |R(iy)| = 1 for its stability polynomial.
     stability_limit: ClassVar[float | None] = 0.997
 
@@ -64,7 +62,6 @@ class Radau(SciPyMethod):
     error_factor: ClassVar[float] = 5.0
     solver = "Radau"
     places = 3
-    evaluations = 3
 
 
 class NDF(SciPyMethod):
@@ -75,7 +72,6 @@ class NDF(SciPyMethod):
     source = "Shampine and Reichelt (1997), SIAM J. Sci. Comput. 18, 1-22, through SciPy"
     solver = "BDF"
     places = 1
-    evaluations = 1
     multistep = True
 
 

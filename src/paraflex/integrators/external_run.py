@@ -42,18 +42,13 @@ class ExternalRun:
         self.problem = problem
         self.samples: Samples = empty_samples(problem.times, problem.system)
         self._stepper, self._options, self._scratch = stepper, options, make_scratch(problem.system.packed)
-        packed, initial = problem.system.packed, problem.initial
-        self.dependent_rows: int
-        self.dependent_at_start: int
-        self.dependent_rows = self.dependent_at_start = int(
-            factor_system(packed, 0.0, initial.q, problem.system.workspace())
-        )
+        system, initial = problem.system, problem.initial
+        self.dependent_at_start: int = int(factor_system(system.packed, 0.0, initial.q, system.workspace()))
+        self.dependent_rows: int = self.dependent_at_start
         self.reached: int = 0
         self._steps, self._balance, self._violation, self._energy = 0, 0.0, np.zeros(2), np.zeros(3)
         self._passages: list[tuple[float, float]] = []
-        self._instant = Instant(
-            initial.time, initial.q, initial.v, np.zeros(problem.system.n), np.zeros(problem.system.m), 0.0
-        )
+        self._instant = Instant(initial.time, initial.q, initial.v, np.zeros(system.n), np.zeros(system.m), 0.0)
 
     @property
     def singular_ahead(self) -> float | None:

@@ -15,16 +15,8 @@ from paraflex.arrays import Array
 from paraflex.dynamics import System, dependence, inputs_of
 from paraflex.integrators.options import IntegrationOptions
 from paraflex.integrators.run import DEPENDENT_PART, Problem
+from paraflex.kernel import ode
 from paraflex.kernel.error import MEMORY_PART
-from paraflex.kernel.ode import (
-    accelerations,
-    descriptor_jacobian,
-    descriptor_residual,
-    rates,
-    rates_jacobian,
-    stabilised_jacobian,
-    stabilised_residual,
-)
 from paraflex.kernel.packed import OMEGA2, Signals
 from paraflex.kernel.tangent import make_tangent
 
@@ -65,7 +57,7 @@ class OdeForm:
     def solve(self, t: float, q: Array, v: Array) -> Solved:
         """Return accelerations and multipliers."""
         a, lam = np.zeros(self.system.n), np.zeros(self.system.m)
-        dependent = accelerations(
+        dependent = ode.accelerations(
             self.system.packed, self.signals, t, self._weights, np.ascontiguousarray(q), np.ascontiguousarray(v),
             a, lam, self._torques, self._ws, DEPENDENT_PART,
         )  # fmt: skip
@@ -74,7 +66,7 @@ class OdeForm:
     def rates(self, t: float, y: Array) -> Array:
         """Return y' at (t, y), in a new array."""
         dy = np.empty(y.size)
-        rates(
+        ode.rates(
             self.system.packed, self.signals, t, self._weights, np.array(y), self._a, self._lam, self._torques,
             self._ws, DEPENDENT_PART, dy,
         )  # fmt: skip
@@ -85,7 +77,7 @@ class OdeForm:
         out = np.empty((y.size, y.size))
         self.rates(t, y)
         arguments = (self._a, self._lam, self._torques, self._ws, self._tangent, out)
-        rates_jacobian(self.system.packed, self._weights, np.array(y), *arguments)
+        ode.rates_jacobian(self.system.packed, self._weights, np.array(y), *arguments)
         return out
 
     def pack(self, t: float, q: Array, v: Array, work: float) -> Array:
@@ -141,14 +133,14 @@ class DescriptorForm(OdeForm):
     def residual(self, t: float, y: Array, dy: Array, out: Array) -> None:
         """Compute the residual into out (size,)."""
         arguments = (np.array(y), np.array(dy), self._dropped, self._torques, self._ws, out)
-        descriptor_residual(self.system.packed, self.signals, t, self._weights, *arguments)
+        ode.descriptor_residual(self.system.packed, self.signals, t, self._weights, *arguments)
 
     def matrix(self, t: float, y: Array, dy: Array, c: float) -> Array:
         """Return the derivative of the residual by y, plus c times that by dy, in a new array."""
         out = np.empty((self.size, self.size))
         self.residual(t, y, dy, np.empty(self.size))
         arguments = (c, self._dropped, self._torques, self._ws, self._tangent, out)
-        descriptor_jacobian(self.system.packed, self._weights, np.array(y), np.array(dy), *arguments)
+        ode.descriptor_jacobian(self.system.packed, self._weights, np.array(y), np.array(dy), *arguments)
         return out
 
     def pack(self, t: float, q: Array, v: Array, work: float) -> Array:
@@ -179,14 +171,14 @@ class StabilisedForm(DescriptorForm):
         """Compute the residual into out (size,)."""
         arguments = (self._weight, self._torques, self._idle, self._ws, self._tangent, self._phi, self._dphi, out)
         packed, signals = self.system.packed, self.signals
-        stabilised_residual(packed, signals, t, np.array(y), np.array(dy), self._dropped, *arguments)
+        ode.stabilised_residual(packed, signals, t, np.array(y), np.array(dy), self._dropped, *arguments)
 
     def matrix(self, t: float, y: Array, dy: Array, c: float) -> Array:
         """Return the derivative of the residual by y, plus c times that by dy, in a new array."""
         out = np.empty((self.size, self.size))
         self.residual(t, y, dy, np.empty(self.size))
         arguments = (self._weight, self._torques, self._idle, self._ws, self._tangent, out)
-        stabilised_jacobian(self.system.packed, np.array(y), np.array(dy), c, self._dropped, *arguments)
+        ode.stabilised_jacobian(self.system.packed, np.array(y), np.array(dy), c, self._dropped, *arguments)
         return out
 
 

@@ -252,7 +252,7 @@ class Integration:
         """Return the complete state of the integration, exact to the last bit; for own methods only."""
         more = {name: getattr(self, name) for name in _KEPT}
         arrays = tuple(one.copy() for one in own(self.run).arrays())
-        return IntegrationState(arrays, more | {"_ends": copy.copy(self._ends), "_pace": self._pace.copy()})
+        return IntegrationState(arrays, more | {"_ends": copy.copy(self._ends), "_pace": copy.deepcopy(self._pace)})
 
     def restore(self, kept: IntegrationState) -> None:
         """Restore a state from `saved`, of this integration or of one made with the same arguments."""
@@ -261,7 +261,7 @@ class Integration:
             mine[...] = array
         for name, value in kept.more.items():
             setattr(self, name, value)
-        self._ends, self._pace = copy.copy(self._ends), self._pace.copy()
+        self._ends, self._pace = copy.copy(self._ends), copy.deepcopy(self._pace)
 
     @property
     def can_continue(self) -> bool:

@@ -17,34 +17,17 @@ from paraflex.integrators.newmark import NewmarkMethod
 from paraflex.integrators.options import Control, IntegrationOptions, TolerancePer
 from paraflex.integrators.run import DEPENDENT_PART, FIRST_STEP, Figures, Instant, Problem, Run, empty_samples
 from paraflex.integrators.singular_start import BranchPose, begin_on_branch, pose_on_branch
+from paraflex.kernel import indices as at
 from paraflex.kernel.linear import factor_system
 from paraflex.kernel.march import march, start
 from paraflex.kernel.packed import Workspace
 from paraflex.kernel.run_state import (
-    BALANCE,
     BAUMGARTE,
-    CYCLE,
-    DPHI_MAX,
-    FACTORS,
     FINISHED,
     GGL,
-    ITERATIONS,
-    JUMPED,
-    PASSAGES,
     PAUSED,
-    PHI_MAX,
     POSITION,
     PROJECTION,
-    REJECTED,
-    ROOT,
-    ROOT_RATE,
-    SAMPLE,
-    STEP,
-    STEPS,
-    STOP,
-    TIME,
-    UNRESOLVED,
-    WORK,
     Controls,
     March,
     Samples,
@@ -113,21 +96,21 @@ class NativeRun:
     @property
     def singular_ahead(self) -> float | None:
         """Time at which an index-3 method is about to reach a singular position [s], see `Run`; None for none."""
-        root, slope = self.state.clock[ROOT], self.state.clock[ROOT_RATE]
-        elapsed = self.state.clock[TIME] - self.problem.initial.time
+        root, slope = self.state.clock[at.ROOT], self.state.clock[at.ROOT_RATE]
+        elapsed = self.state.clock[at.TIME] - self.problem.initial.time
         if self.controls.treatment != POSITION or not slope < 0.0 or root > _NEAR_AHEAD * elapsed * -slope:
             return None
-        return float(self.state.clock[TIME] - root / slope)
+        return float(self.state.clock[at.TIME] - root / slope)
 
     @property
     def attempts(self) -> int:
         """Number of attempted steps, see `Run`."""
-        return int(self.state.counts[STEPS] + self.state.counts[REJECTED])
+        return int(self.state.counts[at.STEPS] + self.state.counts[at.REJECTED])
 
     @property
     def reached(self) -> int:
         """Number of samples taken, see `Run`."""
-        return int(self.state.counts[SAMPLE])
+        return int(self.state.counts[at.SAMPLE])
 
     def start(self) -> None:
         """Compute the initial accelerations and multipliers and take the first sample, see `Run`."""
@@ -139,13 +122,13 @@ class NativeRun:
 
     def march(self, attempts: int) -> int:
         """Attempt a number of steps and return a code, see `Run`."""
-        jumps, now = self.problem.jumps, self.state.clock[TIME]
+        jumps, now = self.problem.jumps, self.state.clock[at.TIME]
         # The last call may have ended at a jump, with the values before it.
         if np.any(jumps == now):
             self.resume()
             # Steps grow again as from the start: the error estimate of a long step does not contain the effect of a
             # jump.
-            self.state.clock[STEP] = min(self.state.clock[STEP], FIRST_STEP * self.problem.span)
+            self.state.clock[at.STEP] = min(self.state.clock[at.STEP], FIRST_STEP * self.problem.span)
         stops = self.problem.stops
         ahead = jumps[(jumps > now) & (jumps < stops[-1])]
         if ahead.size:
@@ -158,40 +141,40 @@ class NativeRun:
     @property
     def time(self) -> float:
         """Current time [s], see `Run`."""
-        return float(self.state.clock[TIME])
+        return float(self.state.clock[at.TIME])
 
     def now(self) -> Instant:
         """Return the current state, see `Run`."""
         state = self.state
         return Instant(
-            t=float(state.clock[TIME]),
+            t=float(state.clock[at.TIME]),
             q=state.q.copy(),
             v=state.v.copy(),
             a=state.stage_a[1, 0].copy(),
             multipliers=state.stage_lam[0].copy(),
-            work=float(state.clock[WORK]),
+            work=float(state.clock[at.WORK]),
         )
 
     def figures(self) -> Figures:
         """Return counts, residuals and errors so far, see `Run`."""
         state, estimated = self.state, self.scheme.error.size and not self.controls.fixed_step
         return Figures(
-            steps=int(state.counts[STEPS]),
-            rejected=int(state.counts[REJECTED]),
-            newton_iterations=int(state.counts[ITERATIONS]),
-            factorisations=int(state.counts[FACTORS]),
-            evaluations=int(state.counts[ITERATIONS]),
-            constraint_position_max=float(state.clock[PHI_MAX]),
-            constraint_velocity_max=float(state.clock[DPHI_MAX]),
-            energy_balance_max=float(state.clock[BALANCE]),
-            passages=state.passages[:, : state.counts[PASSAGES]],
-            multiplier_errors=_FORCE_SAFETY * state.forces[UNRESOLVED] if estimated else None,
+            steps=int(state.counts[at.STEPS]),
+            rejected=int(state.counts[at.REJECTED]),
+            newton_iterations=int(state.counts[at.ITERATIONS]),
+            factorisations=int(state.counts[at.FACTORS]),
+            evaluations=int(state.counts[at.ITERATIONS]),
+            constraint_position_max=float(state.clock[at.PHI_MAX]),
+            constraint_velocity_max=float(state.clock[at.DPHI_MAX]),
+            energy_balance_max=float(state.clock[at.BALANCE]),
+            passages=state.passages[:, : state.counts[at.PASSAGES]],
+            multiplier_errors=_FORCE_SAFETY * state.forces[at.UNRESOLVED] if estimated else None,
         )
 
     def until(self, time: float) -> NativeRun:
         """Return the same run with a step that ends at a time before its end, where it pauses."""
         before = self.problem.stops[self.problem.stops < time]
-        self.state.counts[STOP] = 0
+        self.state.counts[at.STOP] = 0
         return replace(self, problem=replace(self.problem, stops=np.append(before, time)))
 
     def arrays(self) -> tuple[np.ndarray, ...]:
@@ -200,7 +183,7 @@ class NativeRun:
 
     def resume(self) -> None:
         """Let the next step begin with a new first stage, after a jump; energies and work continue."""
-        self.state.counts[JUMPED] = 1
+        self.state.counts[at.JUMPED] = 1
 
 
 def own(run: Run) -> NativeRun:
@@ -267,8 +250,8 @@ def prepare(problem: Problem, options: IntegrationOptions) -> NativeRun:
         permanent = _mark_redundant(system, branch.q, workspace)
     # In steps shorter than the second value, rows near dependence are negligible.
     first = FIRST_STEP * span if branch is None else 0.1 * branch.later
-    state.clock[TIME], state.clock[STEP] = initial.time, min(first, options.max_step)
-    state.clock[CYCLE] = span
+    state.clock[at.TIME], state.clock[at.STEP] = initial.time, min(first, options.max_step)
+    state.clock[at.CYCLE] = span
     tolerance, phase = options.tolerance_for(system), _PHASES[min(method.order, 4)]
     latest = max(abs(initial.time), abs(float(problem.stops[-1])))
     controls = Controls(

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections import deque
-from copy import copy
 
 import numpy as np
 
@@ -47,12 +46,6 @@ class Pace:
         self._start, self._end, self._most, self._window = start, end, most, window
         self._looks: deque[tuple[int, float]] = deque([(0, start)])
         self._usual = math.inf
-
-    def copy(self) -> Pace:
-        """Return an independent copy of the pace."""
-        other = copy(self)
-        other._looks = self._looks.copy()
-        return other
 
     @property
     def most(self) -> int:
@@ -122,8 +115,7 @@ def _fastest(system: System, now: Instant) -> str:
     body, turns = system.bodies[parts[worst][0]], parts[worst][1] == 2
     place = [body.angle] if turns else list(range(body.position.start, body.position.stop))
     speed, acceleration = (float(np.linalg.norm(x[place])) for x in (now.v, now.a))
-    unit = "rad" if turns else "m"
-    what = "turns" if turns else "moves"
+    what, unit = ("turns", "rad") if turns else ("moves", "m")
     return f"{body.name} {what} at {speed:.3g} {unit}/s and accelerates by {acceleration:.2g} {unit}/s^2"
 
 

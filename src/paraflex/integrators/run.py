@@ -17,7 +17,7 @@ from paraflex.arrays import Array
 from paraflex.dynamics import Inputs, State, System, inputs_of
 from paraflex.errors import InputError
 from paraflex.integrators.limits import StepLimits, step_limits
-from paraflex.kernel.arrays import apart
+from paraflex.kernel.arrays import allocated
 from paraflex.kernel.packed import Signals
 from paraflex.kernel.run_state import Samples
 
@@ -192,12 +192,12 @@ def make_problem(
 
 def empty_samples(times: Array, system: System, stored: NDArray[np.bool_] | None = None) -> Samples:
     """Return samples to be filled."""
-    widths = {"q": system.n, "v": system.n, "a": system.n, "lam": system.m, "energy": 3}
-    arrays = {name: apart((times.size, width)) for name, width in widths.items()}
-    for array in arrays.values():
-        array.fill(np.nan)
     stored = np.ones(times.size, dtype=bool) if stored is None else np.ascontiguousarray(stored)
-    return Samples(times=times, stored=stored, solved=np.zeros(times.size, dtype=bool), **arrays)
+    given = {"times": times, "stored": stored, "solved": np.zeros(times.size, dtype=bool)}
+    samples = allocated(Samples, {"times": times.size, "n": system.n, "m": system.m}, **given)
+    for array in (samples.q, samples.v, samples.a, samples.lam, samples.energy):
+        array.fill(np.nan)
+    return samples
 
 
 def jump_times(signals: Signals, inputs: Inputs, knots: Array) -> Array:

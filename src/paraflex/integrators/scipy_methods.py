@@ -11,23 +11,21 @@ import scipy
 from paraflex.arrays import Array
 from paraflex.integrators.external_methods import SciPyMethod
 from paraflex.integrators.forms import OdeForm
-from paraflex.integrators.stepper import SolverCounts, Steps, attempts
+from paraflex.integrators.stepper import SolverCounts, Stepper, Steps, attempts
 from paraflex.kernel.run_state import ERROR_TEST, NOT_FINITE, PAUSED
 
 # Smallest relative tolerance that SciPy accepts without a warning.
 _RELATIVE = 1e-13
 
 
-class ScipyStepper:
-    """Steps of one of SciPy's solvers with given absolute tolerances: see `Stepper`."""
+class ScipyStepper(Stepper):
+    """Steps of one of SciPy's solvers with given absolute tolerances."""
 
     def __init__(self, method: SciPyMethod, form: OdeForm, tolerances: Array, steps: Steps) -> None:
+        super().__init__(form, tolerances, steps)
         # The solver's module is loaded only when one runs.
         self._class = getattr(scipy.integrate, method.solver)
-        self._places, self._stages = method.places, method.evaluations
-        self.form = form
-        self._tolerances, self._steps = tolerances, steps
-        self._seen: list[float] = []
+        self._places, self._stages = method.places, 0 if method.explicit else method.places
         self._past, self._rejected, self._dense = SolverCounts(0, 0, 0, 0), 0, None
 
     def begin(self, t: float, y: Array, stop: float) -> None:
@@ -59,17 +57,8 @@ class ScipyStepper:
             self._rejected += tried
             return ERROR_TEST if np.all(np.isfinite(self._last)) else NOT_FINITE
         self._rejected += max(tried - 1, 0)
+        self.t, self.y = float(solver.t), solver.y
         return PAUSED if np.all(np.isfinite(solver.y)) else NOT_FINITE
-
-    @property
-    def t(self) -> float:
-        """Current time [s]."""
-        return float(self._solver.t)
-
-    @property
-    def y(self) -> Array:
-        """Solution at the current time."""
-        return self._solver.y
 
     def at(self, time: float) -> Array:
         """Return the solution within the last step, by the solver's own interpolation."""

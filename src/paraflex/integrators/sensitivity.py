@@ -17,12 +17,14 @@ from paraflex.integrators.methods import METHODS, Family, Treatment
 from paraflex.integrators.native import NativeRun, prepare
 from paraflex.integrators.options import IntegrationOptions
 from paraflex.integrators.run import Problem, empty_samples
+from paraflex.kernel import indices as at
+from paraflex.kernel.arrays import allocated
 from paraflex.kernel.krylov import make_krylov
 from paraflex.kernel.packed import PackedSystem, Signals, make_scratch
-from paraflex.kernel.rounding import History, make_history, sample_energies, solve_steps_to_rounding
-from paraflex.kernel.run_state import FAILURES, FINISHED, LAST_STEP, PAUSED, STEPS, TIME, make_march
+from paraflex.kernel.rounding import History, sample_energies, solve_steps_to_rounding
+from paraflex.kernel.run_state import FINISHED, PAUSED, make_march
 from paraflex.kernel.sensitivity import make_piece, sensitivity_steps
-from paraflex.kernel.sensitivity_samples import DIFFERENCE_STEP, PLACES, Sensitivity, make_sensitivity
+from paraflex.kernel.sensitivity_samples import DIFFERENCE_STEP, PLACES, Sensitivity
 from paraflex.kernel.tangent import make_tangent
 
 # Number of steps in memory at a time.
@@ -154,8 +156,8 @@ def run_derivatives(problem: Problem, options: IntegrationOptions, directions: S
     varied = _Varied(problem, run, directions)
     for chunk in _chunks(run):
         varied.go_through(chunk)
-    _check_on_beams(problem, varied.motion)
     motion, names = varied.motion, ("sample_q", "sample_v", "sample_a", "sample_lam", "sample_work")
+    _check_on_beams(problem, motion)
     derivatives = (
         np.reshape([getattr(y, name) for y in varied.variations], (len(directions), *part.shape))
         for name, part in zip(names, motion, strict=True)
@@ -164,7 +166,7 @@ def run_derivatives(problem: Problem, options: IntegrationOptions, directions: S
         t=problem.times,
         motion=motion,
         derivatives=Motion(*derivatives),
-        steps=int(run.state.counts[STEPS]),
+        steps=int(run.state.counts[at.STEPS]),
         residual=varied.residual,
     )
 
@@ -199,31 +201,37 @@ class _Chunk:
     signals: Signals
 
 
+def _sizes(run: NativeRun) -> dict[str, int]:
+    """Return the sizes of arrays for the steps in memory."""
+    system = run.problem.system
+    return {"steps": _STEPS_AT_ONCE, "stages": run.scheme.c.size, "n": system.n, "m": system.m}
+
+
 def _chunks(run: NativeRun) -> Iterator[_Chunk]:
     """Yield the accepted steps of a run as it advances, in one history that is refilled."""
     problem, state, jumps = run.problem, run.state, run.problem.jumps
-    history = make_history(_STEPS_AT_ONCE, run.scheme.c.size, problem.system.n, problem.system.m)
+    history = allocated(History, _sizes(run))
     run.start()
     count, restart, code = 0, True, PAUSED
-    signals = problem.signals_from(state.clock[TIME])
+    signals = problem.signals_from(state.clock[at.TIME])
     while True:
-        before, accepted = float(state.clock[TIME]), state.counts[STEPS]
+        before, accepted = float(state.clock[at.TIME]), state.counts[at.STEPS]
         code = run.march(1)
         if code == FINISHED:
             break
         if code != PAUSED:
             cause, remedy = CAUSES[code]
             raise IntegrationError(cause, Moment(before, int(accepted)), remedy=remedy)
-        if state.counts[STEPS] == accepted:
+        if state.counts[at.STEPS] == accepted:
             # The first stage is solved again for the second shorter step.
-            restart |= bool(state.counts[FAILURES] == 2)
+            restart |= bool(state.counts[at.FAILURES] == 2)
             continue
-        history.t[count], history.h[count], history.restart[count] = before, state.clock[LAST_STEP], restart
+        history.t[count], history.h[count], history.restart[count] = before, state.clock[at.LAST_STEP], restart
         history.a[count], history.lam[count] = state.stage_a[0], state.stage_lam
-        count, restart = count + 1, bool(np.any(jumps == state.clock[TIME]))
+        count, restart = count + 1, bool(np.any(jumps == state.clock[at.TIME]))
         if count == _STEPS_AT_ONCE or restart:
             yield _Chunk(history, count, signals)
-            count, signals = 0, problem.signals_from(state.clock[TIME])
+            count, signals = 0, problem.signals_from(state.clock[at.TIME])
     if count:
         yield _Chunk(history, count, signals)
 
@@ -246,10 +254,9 @@ class _Varied:
             for direction in directions
         ]
         self.pieces = tuple(make_piece(problem.signals) for _ in PLACES)
+        sizes = {**_sizes(run), "states": stages + 1, "times": problem.times.size}
         self.variations = [
-            make_sensitivity(
-                _STEPS_AT_ONCE, stages, system.n, system.m, problem.times, np.ascontiguousarray(direction.times)
-            )
+            allocated(Sensitivity, sizes, times=problem.times, sample_times=np.ascontiguousarray(direction.times))
             for direction in directions
         ]
         gains = np.array([run.controls.alpha, run.controls.beta])
@@ -261,14 +268,9 @@ class _Varied:
     def motion(self) -> Motion:
         """Samples of the run."""
         samples = self.samples
-        return Motion(samples.q, samples.v, samples.a, samples.lam, self.work)
-
-    @property
-    def work(self) -> Array:
-        """Work without that of weight, which is included in the samples relative to the origin of the ground frame."""
-        samples = self.samples
+        # The work in the samples includes that of weight, relative to the origin of the ground frame.
         weight = energies(self.problem.system.packed, samples.q, samples.v, samples.lam)[:, 2]
-        return samples.energy[:, 2] - weight
+        return Motion(samples.q, samples.v, samples.a, samples.lam, samples.energy[:, 2] - weight)
 
     def go_through(self, chunk: _Chunk) -> None:
         """Solve and differentiate the steps of a chunk."""

@@ -21,9 +21,10 @@ from paraflex.dynamics.projection import assemble, closed, constraint_change, li
 from paraflex.dynamics.rank import DENSE_ROWS
 from paraflex.dynamics.signals import moment_signals
 from paraflex.integrators.run import Problem
+from paraflex.kernel import indices as at
 from paraflex.kernel.linear import factor_system
 from paraflex.kernel.packed import Workspace
-from paraflex.kernel.run_state import PREPARED, ROOT, ROOT_RATE, ROOT_STEP, WIDEST, March
+from paraflex.kernel.run_state import March
 
 # Distance from the start at which the motion is examined [rad, sizes of the mechanism].
 _BESIDE = 1e-2
@@ -56,9 +57,9 @@ def begin_on_branch(problem: Problem, branch: BranchPose, march: March, aside: W
     a += _missing(problem, branch.later, a)
     march.algorithmic[0] = a
     factor_system(problem.system.packed, 0.0, branch.q, aside)
-    march.clock[ROOT], march.clock[ROOT_RATE] = 0.0, sqrt(max(aside.least[0], 0.0)) / branch.later
-    march.clock[WIDEST] = 1.0
-    march.counts[ROOT_STEP], march.counts[PREPARED] = 0, 1
+    march.clock[at.ROOT], march.clock[at.ROOT_RATE] = 0.0, sqrt(max(aside.least[0], 0.0)) / branch.later
+    march.clock[at.WIDEST] = 1.0
+    march.counts[at.ROOT_STEP], march.counts[at.PREPARED] = 0, 1
 
 
 def _missing(problem: Problem, later: float, a: Array) -> Array:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from typing import NamedTuple, Protocol
+from typing import NamedTuple
 
 import numpy as np
 
@@ -35,36 +36,40 @@ class Steps(NamedTuple):
     order: int
 
 
-class Stepper(Protocol):
-    """Solver between steps."""
+class Stepper(ABC):
+    """Solver between steps.
 
-    form: OdeForm
+    Attributes
+    ----------
+    form : OdeForm
+        Equations that it solves.
+    t : float
+        Current time [s].
+    y : array
+        Solution at the current time.
+    """
 
+    def __init__(self, form: OdeForm, tolerances: Array, steps: Steps) -> None:
+        self.form, self._tolerances, self._steps = form, tolerances, steps
+        self.t, self.y = 0.0, np.zeros(0)
+        # Times of evaluations in the current step.
+        self._seen: list[float] = []
+
+    @abstractmethod
     def begin(self, t: float, y: Array, stop: float) -> None:
         """Restart from y at t towards a stop."""
-        ...
 
+    @abstractmethod
     def step(self, stop: float) -> int:
         """Take one step, to the stop or before it; return PAUSED or the cause of a failure."""
-        ...
 
-    @property
-    def t(self) -> float:
-        """Current time [s]."""
-        ...
-
-    @property
-    def y(self) -> Array:
-        """Solution at the current time."""
-        ...
-
+    @abstractmethod
     def at(self, time: float) -> Array:
         """Return the solution within the last step, by the solver's own interpolation."""
-        ...
 
+    @abstractmethod
     def counts(self) -> SolverCounts:
         """Return the counts since the run began."""
-        ...
 
 
 def attempts(times: Sequence[float], start: float, places: int) -> int:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import io
 import math
+from abc import abstractmethod
 from importlib import import_module
 from types import ModuleType
 from typing import Any
@@ -15,7 +16,7 @@ from paraflex.arrays import Array
 from paraflex.errors import optional_package
 from paraflex.integrators.external_methods import ExternalMethod
 from paraflex.integrators.forms import DescriptorForm, OdeForm
-from paraflex.integrators.stepper import SolverCounts, Steps, attempts
+from paraflex.integrators.stepper import SolverCounts, Stepper, Steps, attempts
 from paraflex.kernel.run_state import ERROR_TEST, NO_CONVERGENCE, NOT_FINITE, PAUSED
 
 # Smallest relative tolerance that SUNDIALS recommends.
@@ -41,19 +42,13 @@ def load_sundials() -> ModuleType:
         return import_module("sksundae")
 
 
-class SundialsStepper:
-    """Common base of CVODE and IDA: see `Stepper`."""
+class SundialsStepper(Stepper):
+    """Common base of CVODE and IDA."""
 
-    form: OdeForm
-    t: float
-    y: Array
-
-    def __init__(self, tolerances: Array, steps: Steps) -> None:
+    def __init__(self, form: OdeForm, tolerances: Array, steps: Steps) -> None:
+        super().__init__(form, tolerances, steps)
         self._package = load_sundials()
-        self._tolerances, self._steps = tolerances, steps
-        self._seen: list[float] = []
-        self._counts, self._here, self._matrices, self._last = SolverCounts(0, 0, 0, 0), None, 0, np.zeros(1)
-        self.t, self.y = 0.0, np.zeros(0)
+        self._counts, self._matrices, self._last = SolverCounts(0, 0, 0, 0), 0, np.zeros(1)
 
     def begin(self, t: float, y: Array, stop: float) -> None:
         """Restart from y at t towards a stop, see `Stepper`."""
@@ -67,8 +62,7 @@ class SundialsStepper:
             "max_order": self._steps.order,
             "linsolver": "lapackdense" if y.size > _LAPACK else "dense",
         }
-        self._solver = self._create(options)
-        self._start(t, y)
+        self._solver = self._started(t, y, options)
 
     def step(self, stop: float) -> int:
         """Take one step and return a code, see `Stepper`."""
@@ -101,26 +95,22 @@ class SundialsStepper:
         with contextlib.redirect_stdout(io.StringIO()):
             return self._solver.step(time, method=method, tstop=self._stop)
 
-    def _create(self, options: dict[str, Any]) -> Any:
-        raise NotImplementedError
-
-    def _start(self, t: float, y: Array) -> None:
-        raise NotImplementedError
+    @abstractmethod
+    def _started(self, t: float, y: Array, options: dict[str, Any]) -> Any:
+        """Return a solver that has been started from y at t."""
 
 
 class CvodeStepper(SundialsStepper):
     """CVODE for the ODE form."""
 
     def __init__(self, method: ExternalMethod, form: OdeForm, *arguments: Any) -> None:
-        super().__init__(*arguments)
-        self.form = form
+        super().__init__(form, *arguments)
         self._method = method.solver
 
-    def _create(self, options: dict[str, Any]) -> Any:
-        return self._package.cvode.CVODE(self._rates, method=self._method, jacfn=self._jacobian, **options)
-
-    def _start(self, t: float, y: Array) -> None:
-        self._solver.init_step(t, y)
+    def _started(self, t: float, y: Array, options: dict[str, Any]) -> Any:
+        solver = self._package.cvode.CVODE(self._rates, method=self._method, jacfn=self._jacobian, **options)
+        solver.init_step(t, y)
+        return solver
 
     def _rates(self, t: float, y: Array, dy: Array) -> None:
         self._seen.append(t)
@@ -135,16 +125,14 @@ class IdaStepper(SundialsStepper):
     """IDA for a form with multipliers."""
 
     def __init__(self, form: DescriptorForm, *arguments: Any) -> None:
-        super().__init__(*arguments)
-        self.form: OdeForm = form
+        super().__init__(form, *arguments)
         self._implicit = form
 
-    def _create(self, options: dict[str, Any]) -> Any:
+    def _started(self, t: float, y: Array, options: dict[str, Any]) -> Any:
         algebraic = self._implicit.algebraic.tolist() or None
-        return self._package.ida.IDA(self._residual, algebraic_idx=algebraic, jacfn=self._matrix, **options)
-
-    def _start(self, t: float, y: Array) -> None:
-        self._solver.init_step(t, y, self._implicit.slopes(t, y))
+        solver = self._package.ida.IDA(self._residual, algebraic_idx=algebraic, jacfn=self._matrix, **options)
+        solver.init_step(t, y, self._implicit.slopes(t, y))
+        return solver
 
     def _residual(self, t: float, y: Array, dy: Array, out: Array) -> None:
         self._seen.append(t)

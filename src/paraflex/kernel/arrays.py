@@ -7,14 +7,19 @@ runs would differ by rounding.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from functools import cache
 from math import prod
-from typing import Any
+from typing import Any, TypeVar, get_type_hints
 
 import numpy as np
 from numpy.typing import NDArray
 
-from paraflex.kernel.compiling import routine
+from paraflex.kernel.compiling import inlined, routine
 
+Floats = NDArray[np.float64]
+Ints = NDArray[np.int64]
+R = TypeVar("R")
 # Unused entries before and after an array: more than a vectorised loop processes at once.
 ROOM = 128
 
@@ -23,6 +28,31 @@ def apart(shape: int | tuple[int, ...], dtype: type = float) -> NDArray[Any]:
     """Return an array of zeros of a given shape, padded on both sides in memory."""
     count = shape if isinstance(shape, int) else prod(shape)
     return np.zeros(count + 2 * ROOM, dtype)[ROOM : ROOM + count].reshape(shape)
+
+
+@cache
+def _annotations(record: type) -> dict[str, Any]:
+    return get_type_hints(record, include_extras=True)
+
+
+def allocated(record: type[R], sizes: Mapping[str, int], **given: Any) -> R:
+    """Return a record of arrays of zeros, padded on both sides in memory.
+
+    Parameters
+    ----------
+    record : type
+        Class of named tuples. A field annotated as Annotated[Floats, 2, "n"] is an array of the shape (2, n).
+    sizes : mapping of str to int
+        Sizes by name.
+    **given
+        Fields that are not allocated here.
+    """
+    arrays = {}
+    for name, kind in _annotations(record).items():
+        if name not in given:
+            shape = tuple(size if isinstance(size, int) else sizes[size] for size in kind.__metadata__)
+            arrays[name] = apart(shape, np.int64 if kind.__origin__ == Ints else float)
+    return record(**arrays, **given)
 
 
 @routine
@@ -53,3 +83,15 @@ def largest(x):
     for i in range(x.size):
         size = max(size, abs(x[i]))
     return size
+
+
+@inlined
+def last_before(x, low, high, value):
+    """Return the index of the last entry not above a value among those from low to high, ascending; low if none is."""
+    while low < high:
+        middle = (low + high + 1) // 2
+        if x[middle] <= value:
+            low = middle
+        else:
+            high = middle - 1
+    return low

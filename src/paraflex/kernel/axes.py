@@ -159,11 +159,10 @@ def axis_values(system, q, v, phi, dphi):
     """Add value and rate of the axes that are constraints to phi and dphi."""
     for k in range(system.axes.size):
         row, weight = system.axes[k].row, system.axes[k].weight
-        if row >= 0:
-            if system.rows[row].kind == CONSTRAINT:
-                value, rate, _, _, _, _, _, _, _, _, _ = axis_motion(system, k, q, v, v)
-                phi[row] += weight * value
-                dphi[row] += weight * rate
+        if row >= 0 and system.rows[row].kind == CONSTRAINT:
+            value, rate, _, _, _, _, _, _, _, _, _ = axis_motion(system, k, q, v, v)
+            phi[row] += weight * value
+            dphi[row] += weight * rate
 
 
 @routine
@@ -171,10 +170,9 @@ def fill_axis_rows(system, q, jacobian):
     """Add the rows of the axes that are constraints to a dense Jacobian."""
     for k in range(system.axes.size):
         row, weight = system.axes[k].row, system.axes[k].weight
-        if row >= 0:
-            if system.rows[row].kind == CONSTRAINT:
-                _, _, _, ex, ey, lever, rax, ray, rbx, rby, x = axis_motion(system, k, q, q, q)
-                apply_axis(system, k, q, weight, ex, ey, lever, rax, ray, rbx, rby, x, jacobian[row])
+        if row >= 0 and system.rows[row].kind == CONSTRAINT:
+            _, _, _, ex, ey, lever, rax, ray, rbx, rby, x = axis_motion(system, k, q, q, q)
+            apply_axis(system, k, q, weight, ex, ey, lever, rax, ray, rbx, rby, x, jacobian[row])
 
 
 @routine

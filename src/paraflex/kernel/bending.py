@@ -253,10 +253,8 @@ def note_all_axial_forces(system, q, v, a, lam, work, geometric):
 @routine
 def subtract_geometric(system, i, geometric, scale, u, x):
     """Subtract scale K_g u of body i from x; `geometric` as for `note_all_axial_forces`."""
-    if geometric is None:
-        return
     body = system.bodies[i]
-    if body.slopes > 0:
+    if geometric is not None and body.slopes > 0:
         e, n = body.offset + 3, body.nf
         for j in range(n):
             for l in range(n):
@@ -289,10 +287,8 @@ def factor_dense_body(system, i, b, q, work, dense):
     K_g is left out if the sum with it is not positive definite. Diagonals of the factor hold reciprocals. Returns
     whether the body's matrix is dense; `dense` is work.dense, None if no body has a dense matrix.
     """
-    if dense is None:
-        return False
     body = system.bodies[i]
-    if body.full == 0:
+    if dense is None or body.full == 0:
         return False
     n, width, at = body.nf, 3 + body.nf, body.dense
     g = sqrt(b)

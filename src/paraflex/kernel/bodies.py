@@ -64,9 +64,7 @@ def begin_body(system, i, q, v, a, f, scratch, points):
     """
     body_sums(system, i, q, v, a, scratch)
     clear_shares(system, i, scratch)
-    if points is None:
-        linear_terms(system, i, q, v, a, f, scratch)
-    elif system.bodies[i].slopes > 0:
+    if points is not None and system.bodies[i].slopes > 0:
         second_order_equations(system, i, q, v, a, f, points)
     else:
         linear_terms(system, i, q, v, a, f, scratch)
@@ -130,9 +128,8 @@ def add_weights(system, q, points):
         for j in range(body.nf):
             sx += system.modal[S2X, k + j] * q[o + 3 + j]
             sy += system.modal[S2Y, k + j] * q[o + 3 + j]
-        if points is not None:
-            if body.slopes > 0:
-                sx -= second_order_shortening(system, i, q, points)
+        if points is not None and body.slopes > 0:
+            sx -= second_order_shortening(system, i, q, points)
         c, s = cos(q[o + 2]), sin(q[o + 2])
         total += system.gravity[0] * (body.m * q[o] + c * sx - s * sy)
         total += system.gravity[1] * (body.m * q[o + 1] + s * sx + c * sy)
@@ -175,9 +172,7 @@ def add_energies(system, q, v, scratch, points):
     """Return kinetic and strain energy of all bodies; `points` as for `begin_body`."""
     kinetic, strain = 0.0, 0.0
     for i in range(system.bodies.size):
-        if points is None:
-            t, u = body_energy(system, i, q, v, scratch)
-        elif system.bodies[i].slopes > 0:
+        if points is not None and system.bodies[i].slopes > 0:
             t, u = second_order_energy(system, i, q, v, points)
         else:
             t, u = body_energy(system, i, q, v, scratch)

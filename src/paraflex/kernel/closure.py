@@ -2,25 +2,15 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
-from paraflex.kernel.arrays import apart, copy, fill, largest
+from paraflex.kernel import joints
+from paraflex.kernel.arrays import Floats, Ints, allocated, copy, fill, largest
 from paraflex.kernel.axes import apply_axes
-from paraflex.kernel.compiling import by_reference, releases_lock, routine, unoptimised
+from paraflex.kernel.compiling import by_reference, inlined, releases_lock, routine, unoptimised
 from paraflex.kernel.constraints import constraint_values, fill_jacobian
 from paraflex.kernel.dense import factor_dense, solve_factored
-from paraflex.kernel.joints import (
-    apply_force,
-    apply_torque,
-    body_joints,
-    marker_angles,
-    marker_motion,
-    start_rows,
-)
-from paraflex.kernel.packed import INDEX_1, PackedSystem, Scratch, make_scratch
+from paraflex.kernel.packed import INDEX_1, PackedSystem, Scratch, make_scratch, sizes_of
 
 MAX_ITERATIONS = 20
 # Number of iterations with the factors of the previous sample.
@@ -40,36 +30,29 @@ LOOPS_CLOSED, LOOPS_OPEN, TOO_COARSE, LOOPS_SINGULAR = range(4)
 class ClosureScratch(NamedTuple):
     """Work arrays of the closure."""
 
-    single: NDArray[np.float64]  # (n, 1) residual of positions, then their correction; also for accelerations
-    right: NDArray[np.float64]  # (n, 1 + tasks) right-hand sides of velocities and the basis
-    jacobian: NDArray[np.float64]  # (n, n) dimensionless Jacobian at this sample
-    before: NDArray[np.float64]  # (n, n) dimensionless Jacobian at the previous sample
-    factors: NDArray[np.float64]  # (n, n) factors of `before`
-    order: NDArray[np.int64]
-    fresh: NDArray[np.float64]  # (n, n) factors at the current pose
-    fresh_order: NDArray[np.int64]
-    change: NDArray[np.float64]  # (n, n)
-    here: NDArray[np.float64]  # (3, tasks) task coordinates, their rates and accelerations
-    phi: NDArray[np.float64]  # (m,)
-    dphi: NDArray[np.float64]
-    lam: NDArray[np.float64]  # (m,) zero, like `zero` and `idle`
-    zero: NDArray[np.float64]  # (n,)
-    idle: NDArray[np.float64]  # (signals,) motors have no effect here, but axes read their forces
-    unused: NDArray[np.float64]  # (n,) forces that are not used
+    single: Annotated[Floats, "n", 1]  # residual of positions, then their correction; also for accelerations
+    right: Annotated[Floats, "n", "columns"]  # right-hand sides of velocities and the basis
+    jacobian: Annotated[Floats, "n", "n"]  # dimensionless Jacobian at this sample
+    before: Annotated[Floats, "n", "n"]  # dimensionless Jacobian at the previous sample
+    factors: Annotated[Floats, "n", "n"]  # factors of `before`
+    order: Annotated[Ints, "n"]
+    fresh: Annotated[Floats, "n", "n"]  # factors at the current pose
+    fresh_order: Annotated[Ints, "n"]
+    change: Annotated[Floats, "n", "n"]
+    here: Annotated[Floats, 3, "tasks"]  # task coordinates, their rates and accelerations
+    phi: Annotated[Floats, "m"]
+    dphi: Annotated[Floats, "m"]
+    lam: Annotated[Floats, "m"]  # zero, like `zero` and `idle`
+    zero: Annotated[Floats, "n"]
+    idle: Annotated[Floats, "signals"]  # motors have no effect here, but axes read their forces
+    unused: Annotated[Floats, "n"]  # forces that are not used
     body: Scratch
 
 
 def make_closure_scratch(system: PackedSystem, tasks: int, signals: int) -> ClosureScratch:
     """Allocate the work arrays of `close_path`."""
-    n, m = int(sum(3 + body["nf"] for body in system.bodies)), system.rows.size
-    jacobian, before, factors, fresh, change = (apart((n, n)) for _ in range(5))
-    order, fresh_order = apart(n, np.int64), apart(n, np.int64)
-    phi, dphi, lam = (apart(m) for _ in range(3))
-    return ClosureScratch(
-        single=apart((n, 1)), right=apart((n, 1 + tasks)), jacobian=jacobian, before=before, factors=factors,
-        order=order, fresh=fresh, fresh_order=fresh_order, change=change, here=apart((3, tasks)), phi=phi, dphi=dphi,
-        lam=lam, zero=apart(n), idle=apart(signals), unused=apart(n), body=make_scratch(system),
-    )  # fmt: skip
+    sizes = {**sizes_of(system), "tasks": tasks, "columns": 1 + tasks, "signals": signals}
+    return allocated(ClosureScratch, sizes, body=make_scratch(system))
 
 
 @unoptimised
@@ -78,14 +61,14 @@ def task_values(system, marker, coordinates, q, v, a, out):
 
     `coordinates` (tasks,) are 0 for x, 1 for y, 2 for the angle.
     """
-    px, py, vx, vy, ax, ay, _, _ = marker_motion(system, marker, q, v, a)
+    px, py, vx, vy, ax, ay, _, _ = joints.marker_motion(system, marker, q, v, a)
     for i in range(coordinates.size):
         if coordinates[i] == 0:
             out[0, i], out[1, i], out[2, i] = px, vx, ax
         elif coordinates[i] == 1:
             out[0, i], out[1, i], out[2, i] = py, vy, ay
         else:
-            out[0, i], out[1, i], out[2, i] = marker_angles(system, marker, q, v, a)
+            out[0, i], out[1, i], out[2, i] = joints.marker_angles(system, marker, q, v, a)
 
 
 @routine
@@ -95,13 +78,13 @@ def closure_jacobian(system, marker, coordinates, q, jacobian):
     fill_jacobian(system, q, jacobian)
     for i in range(coordinates.size):
         fill(jacobian[m + i], 0.0)
-    _, _, _, _, _, _, rx, ry = marker_motion(system, marker, q, q, q)
+    _, _, _, _, _, _, rx, ry = joints.marker_motion(system, marker, q, q, q)
     for i in range(coordinates.size):
         if coordinates[i] == 2:
-            apply_torque(system, marker, 1.0, jacobian[m + i])
+            joints.apply_torque(system, marker, 1.0, jacobian[m + i])
         else:
             unit = 1.0 if coordinates[i] == 0 else 0.0
-            apply_force(system, marker, q, unit, 1.0 - unit, rx, ry, jacobian[m + i])
+            joints.apply_force(system, marker, q, unit, 1.0 - unit, rx, ry, jacobian[m + i])
 
 
 @routine
@@ -220,6 +203,16 @@ def close_loops(system, signals, marker, coordinates, t, goal, known, q, work):
     return LOOPS_OPEN, gap
 
 
+@inlined
+def second_derivatives(system, signals, marker, coordinates, t, q, v, a, work):
+    """Compute Phi'' into work.phi, and the task coordinates with two derivatives into work.here."""
+    joints.start_rows(system, signals, t, INDEX_1, work.phi)
+    for i in range(system.bodies.size):
+        joints.body_joints(system, i, q, v, a, work.lam, INDEX_1, work.body, work.unused, work.phi)
+    apply_axes(system, q, v, a, work.lam, INDEX_1, work.idle, work.unused, work.phi)
+    task_values(system, marker, coordinates, q, v, a, work.here)
+
+
 @routine
 def move_loops(system, signals, marker, coordinates, t, target, q, v, a, basis, work):
     """Compute velocities, accelerations and basis of closed loops, with the factors at their pose."""
@@ -238,11 +231,7 @@ def move_loops(system, signals, marker, coordinates, t, target, q, v, a, basis, 
         for i in range(tasks):
             basis[j, i] = work.right[j, 1 + i]
     # Part of Phi'' and of the task's acceleration that does not depend on the accelerations.
-    start_rows(system, signals, t, INDEX_1, work.phi)
-    for i in range(system.bodies.size):
-        body_joints(system, i, q, v, work.zero, work.lam, INDEX_1, work.body, work.unused, work.phi)
-    apply_axes(system, q, v, work.zero, work.lam, INDEX_1, work.idle, work.unused, work.phi)
-    task_values(system, marker, coordinates, q, v, work.zero, work.here)
+    second_derivatives(system, signals, marker, coordinates, t, q, v, work.zero, work)
     for r in range(m):
         work.single[r, 0] = -work.phi[r]
     for i in range(tasks):

@@ -2,13 +2,9 @@
 
 from __future__ import annotations
 
-from paraflex.kernel.arrays import fill
-from paraflex.kernel.axes import apply_axes
-from paraflex.kernel.closure import closure_jacobian, task_values
+from paraflex.kernel.closure import closure_jacobian, second_derivatives
 from paraflex.kernel.compiling import releases_lock
 from paraflex.kernel.constraints import constraint_values
-from paraflex.kernel.joints import body_joints, start_rows
-from paraflex.kernel.packed import INDEX_1
 
 
 @releases_lock
@@ -32,12 +28,7 @@ def closure_residuals(system, signals, marker_index, coordinates, times, target,
         constraint_values(system, signals, times[k], q[k], v[k], work.body, work.phi, work.dphi)
         for r in range(m):
             out[k, r, 0], out[k, r, 1] = work.phi[r], work.dphi[r]
-        start_rows(system, signals, times[k], INDEX_1, work.phi)
-        fill(work.lam, 0.0)
-        for i in range(system.bodies.size):
-            body_joints(system, i, q[k], v[k], a[k], work.lam, INDEX_1, work.body, work.unused, work.phi)
-        apply_axes(system, q[k], v[k], a[k], work.lam, INDEX_1, work.idle, work.unused, work.phi)
-        task_values(system, marker, coordinates, q[k], v[k], a[k], work.here)
+        second_derivatives(system, signals, marker, coordinates, times[k], q[k], v[k], a[k], work)
         for r in range(m):
             out[k, r, 2] = work.phi[r]
         for i in range(tasks):

@@ -4,17 +4,10 @@ from __future__ import annotations
 
 from math import cosh
 
+from paraflex.kernel import joints
 from paraflex.kernel.arrays import fill
 from paraflex.kernel.axes import axis_motion, axis_values, fill_axis_rows
 from paraflex.kernel.compiling import inlined, kernel, routine, unoptimised
-from paraflex.kernel.joints import (
-    angle_by_sums,
-    apply_force,
-    apply_torque,
-    marker_angle,
-    marker_motion,
-    motion_by_sums,
-)
 from paraflex.kernel.packed import ANGLE, AXIS, CONSTRAINT, DAMPER, FRICTION
 from paraflex.kernel.signals import evaluate_signal
 from paraflex.kernel.sums import body_sums
@@ -43,11 +36,13 @@ def constraint_values(system, signals, t, q, v, scratch, phi, dphi):
             if system.rows[r].kind != CONSTRAINT or port.kind == AXIS:
                 continue
             if port.kind == ANGLE:
-                angle, rate, _ = angle_by_sums(system, system.markers[port.marker], q, v, v, scratch)
+                angle, rate, _ = joints.angle_by_sums(system, system.markers[port.marker], q, v, v, scratch)
                 phi[r] += weight * angle
                 dphi[r] += weight * rate
             else:
-                px, py, vx, vy, _, _, _, _ = motion_by_sums(system, system.markers[port.marker], q, v, v, scratch)
+                px, py, vx, vy, _, _, _, _ = joints.motion_by_sums(
+                    system, system.markers[port.marker], q, v, v, scratch
+                )
                 phi[r] += weight * px
                 phi[r + 1] += weight * py
                 dphi[r] += weight * vx
@@ -66,11 +61,11 @@ def fill_jacobian(system, q, jacobian):
         if system.rows[port.row].kind != CONSTRAINT:
             continue
         if port.kind == ANGLE:
-            apply_torque(system, marker, port.weight, jacobian[port.row])
+            joints.apply_torque(system, marker, port.weight, jacobian[port.row])
         elif port.kind != AXIS:
-            _, _, _, _, _, _, rx, ry = marker_motion(system, marker, q, q, q)
-            apply_force(system, marker, q, port.weight, 0.0, rx, ry, jacobian[port.row])
-            apply_force(system, marker, q, 0.0, port.weight, rx, ry, jacobian[port.row + 1])
+            _, _, _, _, _, _, rx, ry = joints.marker_motion(system, marker, q, q, q)
+            joints.apply_force(system, marker, q, port.weight, 0.0, rx, ry, jacobian[port.row])
+            joints.apply_force(system, marker, q, 0.0, port.weight, rx, ry, jacobian[port.row + 1])
     fill_axis_rows(system, q, jacobian)
 
 
@@ -92,12 +87,11 @@ def joint_rates(system, q, v, rates):
     for k in range(system.ports.size):
         port = system.ports[k]
         if port.kind == ANGLE and damped(system.rows[port.row].kind):
-            rates[port.row] += port.weight * marker_angle(system, system.markers[port.marker], v)
+            rates[port.row] += port.weight * joints.marker_angle(system, system.markers[port.marker], v)
     for k in range(system.axes.size):
         row = system.axes[k].row
-        if row >= 0:
-            if damped(system.rows[row].kind):
-                rates[row] += system.axes[k].weight * axis_motion(system, k, q, v, v)[1]
+        if row >= 0 and damped(system.rows[row].kind):
+            rates[row] += system.axes[k].weight * axis_motion(system, k, q, v, v)[1]
     return True
 
 

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from math import exp, isinf
 
+from paraflex.kernel import indices as at
 from paraflex.kernel.arrays import copy, fill, largest
 from paraflex.kernel.bending import subtract_geometric
 from paraflex.kernel.compiling import inlined, routine
@@ -14,18 +15,6 @@ from paraflex.kernel.constraints import note_friction
 from paraflex.kernel.linear import factor_system, jacobian_times, solve_system, to_body_frame, to_ground_frame
 from paraflex.kernel.metric import mass_norm, mass_times
 from paraflex.kernel.packed import OMEGA2
-from paraflex.kernel.run_state import (
-    CYCLE,
-    LAST_STEP,
-    LOCAL,
-    LOST,
-    MEMORY,
-    NEAR,
-    PEAK,
-    RECENT,
-    STEPS,
-    UNRESOLVED,
-)
 from paraflex.kernel.stage import largest_part
 
 # Number of steps after which the factor that filters velocity errors is renewed; a norm needs no recent one.
@@ -62,7 +51,7 @@ def history_error(h, march):
     For v the formula is the integral of the parabola through the accelerations at t - h_0, t and t + h, for q that of
     the cubic with the velocities and accelerations at t and t + h. The results are written to march.eq and march.ev.
     """
-    h0 = march.clock[LAST_STEP]
+    h0 = march.clock[at.LAST_STEP]
     if h0 > 0.0:
         before, end = -h * h * h / (6.0 * h0 * (h0 + h)), h * (h / 3.0 + 0.5 * h0) / (h + h0)
     else:
@@ -97,15 +86,15 @@ def filtered_error(system, g, gains, march, work, slow):
     """
     filter_error(system, g, gains, march.eq, march.ev, work)
     for r in range(work.mu.size):
-        march.forces[LOCAL, r] = abs(work.mu[r]) / g
+        march.forces[at.LOCAL, r] = abs(work.mu[r]) / g
     for j in range(march.q.size):
         march.eq[j] += g * work.x[j]
     position = mass_norm(system, work, march.eq)
-    if march.counts[STEPS] % SLOW_AGE == 0:
+    if march.counts[at.STEPS] % SLOW_AGE == 0:
         note_friction(system, march.q, march.v, slow.mu, slow.compliance)
-        march.clock[MEMORY] = MEMORY_PART * march.clock[CYCLE]
-        factor_system(system, march.clock[MEMORY] * march.clock[MEMORY], march.q, slow)
-    memory = march.clock[MEMORY]
+        march.clock[at.MEMORY] = MEMORY_PART * march.clock[at.CYCLE]
+        factor_system(system, march.clock[at.MEMORY] * march.clock[at.MEMORY], march.q, slow)
+    memory = march.clock[at.MEMORY]
     for j in range(march.q.size):
         march.eq[j] = 0.0
         march.ev[j] = work.x[j]
@@ -122,8 +111,8 @@ def note_lost_vibrations(system, controls, h, g, march, work):
     motions without deflection. Filtering twice leaves out vibrations that are resolved. The stages of the last step
     have all phases.
     """
-    fill(march.forces[LOST], 0.0)
-    if not isinf(controls.force_cycles) or h < GROWN * march.clock[LAST_STEP]:
+    fill(march.forces[at.LOST], 0.0)
+    if not isinf(controls.force_cycles) or h < GROWN * march.clock[at.LAST_STEP]:
         return
     fill(march.eq, 0.0)
     for s in range(march.stage_a.shape[1]):
@@ -133,7 +122,7 @@ def note_lost_vibrations(system, controls, h, g, march, work):
             march.ev[j] -= work.x[j]
         filter_error(system, g, UNCHANGED, march.eq, march.ev, work)
         for r in range(work.mu.size):
-            march.forces[LOST, r] = max(march.forces[LOST, r], abs(work.mu[r]))
+            march.forces[at.LOST, r] = max(march.forces[at.LOST, r], abs(work.mu[r]))
 
 
 @routine
@@ -142,27 +131,27 @@ def force_error(controls, h, march):
 
     It is zero if forces are not controlled.
     """
-    if controls.force_control == 0 or march.counts[NEAR] > 0 or largest(march.forces[PEAK]) == 0.0:
+    if controls.force_control == 0 or march.counts[at.NEAR] > 0 or largest(march.forces[at.PEAK]) == 0.0:
         return 0.0
-    return largest_part(march.forces[LOCAL], march.forces[PEAK]) / allowed_part(controls, h, march)
+    return largest_part(march.forces[at.LOCAL], march.forces[at.PEAK]) / allowed_part(controls, h, march)
 
 
 @inlined
 def allowed_part(controls, h, march):
     """Return the error allowed in forces in a step, as a part of the largest force."""
-    return max(controls.force_part * h / march.clock[CYCLE], LEAST_PART)
+    return max(controls.force_part * h / march.clock[at.CYCLE], LEAST_PART)
 
 
 @routine
 def note_forces(controls, h, march):
     """Record the largest multipliers, and their changes by local errors within some cycles."""
-    forgotten = exp(-h / (controls.force_cycles * march.clock[CYCLE]))
+    forgotten = exp(-h / (controls.force_cycles * march.clock[at.CYCLE]))
     for r in range(march.guess_lam.size):
-        march.forces[PEAK, r] = max(march.forces[PEAK, r], abs(march.stage_lam[0, r]))
-        if march.counts[NEAR] == 0:
-            march.forces[RECENT, r] = forgotten * march.forces[RECENT, r] + march.forces[LOCAL, r]
-            unresolved = max(march.forces[RECENT, r], LOST_SHARE * march.forces[LOST, r])
-            march.forces[UNRESOLVED, r] = max(march.forces[UNRESOLVED, r], unresolved)
+        march.forces[at.PEAK, r] = max(march.forces[at.PEAK, r], abs(march.stage_lam[0, r]))
+        if march.counts[at.NEAR] == 0:
+            march.forces[at.RECENT, r] = forgotten * march.forces[at.RECENT, r] + march.forces[at.LOCAL, r]
+            unresolved = max(march.forces[at.RECENT, r], LOST_SHARE * march.forces[at.LOST, r])
+            march.forces[at.UNRESOLVED, r] = max(march.forces[at.UNRESOLVED, r], unresolved)
 
 
 @routine

@@ -36,20 +36,19 @@ def marker_shortening(system, bending, marker, q, v, a):
     `bending` is system.bending, None for linear geometry.
     """
     f0, f1, f2 = 0.0, 0.0, 0.0
-    if bending is None:
+    if bending is None or marker.bending < 0:
         return f0, f1, f2
     body = system.bodies[marker.body]
     e, n = body.offset + 3, body.nf
-    if marker.bending >= 0:
-        for j in range(n):
-            row = marker.bending + j * body.stride
-            bq, bv = 0.0, 0.0
-            for l in range(n):
-                bq += bending[row + l] * q[e + l]
-                bv += bending[row + l] * v[e + l]
-            f0 += 0.5 * q[e + j] * bq
-            f1 += v[e + j] * bq
-            f2 += a[e + j] * bq + v[e + j] * bv
+    for j in range(n):
+        row = marker.bending + j * body.stride
+        bq, bv = 0.0, 0.0
+        for l in range(n):
+            bq += bending[row + l] * q[e + l]
+            bv += bending[row + l] * v[e + l]
+        f0 += 0.5 * q[e + j] * bq
+        f1 += v[e + j] * bq
+        f2 += a[e + j] * bq + v[e + j] * bv
     return f0, f1, f2
 
 
@@ -138,9 +137,7 @@ def apply_force(system, marker, q, fx, fy, rx, ry, f):
 @inlined
 def shorten(system, bending, marker, q, scale, x, at):
     """Add scale times the derivative of a marker's f/2 to x[at:]; `bending` as for `marker_shortening`."""
-    if bending is None:
-        return
-    if marker.bending < 0:
+    if bending is None or marker.bending < 0:
         return
     body = system.bodies[marker.body]
     e, n = body.offset + 3, body.nf
@@ -344,37 +341,35 @@ def shortening_by_products(system, bending, marker, q, v, a, points):
     `bending` and `points` are None for linear geometry.
     """
     f0, f1, f2 = 0.0, 0.0, 0.0
-    if bending is None:
+    if bending is None or marker.bending < 0:
         return f0, f1, f2
     body = system.bodies[marker.body]
     e = body.offset + 3
-    if marker.bending >= 0:
-        for block in range(0, body.stride, LANES):
-            B_q, B_v, at = zeros(), zeros(), marker.bending + block
-            for l in range(body.nf):
-                # The matrix is symmetric.
-                column = load(bending, at)
-                B_q = add_scaled(B_q, column, q[e + l])
-                B_v = add_scaled(B_v, column, v[e + l])
-                at += body.stride
-            store(points.B_q, block, B_q)
-            store(points.B_v, block, B_v)
-        for j in range(body.nf):
-            f0 += 0.5 * q[e + j] * points.B_q[j]
-            f1 += v[e + j] * points.B_q[j]
-            f2 += a[e + j] * points.B_q[j] + v[e + j] * points.B_v[j]
+    for block in range(0, body.stride, LANES):
+        B_q, B_v, at = zeros(), zeros(), marker.bending + block
+        for l in range(body.nf):
+            # The matrix is symmetric.
+            column = load(bending, at)
+            B_q = add_scaled(B_q, column, q[e + l])
+            B_v = add_scaled(B_v, column, v[e + l])
+            at += body.stride
+        store(points.B_q, block, B_q)
+        store(points.B_v, block, B_v)
+    for j in range(body.nf):
+        f0 += 0.5 * q[e + j] * points.B_q[j]
+        f1 += v[e + j] * points.B_q[j]
+        f2 += a[e + j] * points.B_q[j] + v[e + j] * points.B_v[j]
     return f0, f1, f2
 
 
 @inlined
 def shorten_by_products(system, bending, marker, scale, f, points):
     """Add scale times the derivative of a marker's f/2 to f, directly after `shortening_by_products`."""
-    if bending is None:
+    if bending is None or marker.bending < 0:
         return
-    if marker.bending >= 0:
-        body = system.bodies[marker.body]
-        for j in range(body.nf):
-            f[body.offset + 3 + j] += scale * points.B_q[j]
+    body = system.bodies[marker.body]
+    for j in range(body.nf):
+        f[body.offset + 3 + j] += scale * points.B_q[j]
 
 
 @inlined

@@ -9,14 +9,11 @@ Schultz, 1986).
 from __future__ import annotations
 
 from math import hypot, sqrt
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
-from paraflex.kernel.arrays import apart, fill
+from paraflex.kernel.arrays import Floats, allocated, fill
 from paraflex.kernel.compiling import by_reference, inlined, kernel, routine
-from paraflex.kernel.linear import right_hand_side, solve_system
+from paraflex.kernel.linear import solve_residuals
 from paraflex.kernel.tangent import residual_tangent
 
 # Largest number of basis vectors, and relative residual to which a system is solved.
@@ -27,20 +24,19 @@ MOST_VECTORS, ENOUGH = 60, 1e-12
 class Krylov(NamedTuple):
     """Arrays for a basis, the least-squares problem in it, and the start of a stage."""
 
-    basis: NDArray[np.float64]  # (vectors + 1, n + m) orthonormal, multipliers scaled
-    hessenberg: NDArray[np.float64]  # (vectors, vectors + 1) columns as rows, made triangular by rotations
-    cosines: NDArray[np.float64]  # (vectors,) cosines of the rotations
-    sines: NDArray[np.float64]
-    rest: NDArray[np.float64]  # (vectors + 1,) right-hand side, rotated; then the solution in the basis
-    guess_a: NDArray[np.float64]  # (n,)
-    guess_lam: NDArray[np.float64]  # (m,)
+    basis: Annotated[Floats, "columns", "unknowns"]  # orthonormal, multipliers scaled
+    hessenberg: Annotated[Floats, "vectors", "columns"]  # columns as rows, made triangular by rotations
+    cosines: Annotated[Floats, "vectors"]  # cosines of the rotations
+    sines: Annotated[Floats, "vectors"]
+    rest: Annotated[Floats, "columns"]  # right-hand side, rotated; then the solution in the basis
+    guess_a: Annotated[Floats, "n"]
+    guess_lam: Annotated[Floats, "m"]
 
 
 def make_krylov(n: int, m: int) -> Krylov:
     """Allocate arrays for systems of n accelerations and m multipliers."""
     most = min(MOST_VECTORS, n + m)
-    small = apart((most, most + 1)), apart(most), apart(most), apart(most + 1)
-    return Krylov(apart((most + 1, n + m)), *small, apart(n), apart(m))
+    return allocated(Krylov, {"vectors": most, "columns": most + 1, "unknowns": n + m, "n": n, "m": m})
 
 
 @inlined
@@ -65,8 +61,7 @@ def matrix_times(system, g, b, weights, scale, q, v, a, lam, torques, unit, x, d
         work.f[j] = direction.f[j]
     for r in range(lam.size):
         work.rows[r] = direction.rows[r]
-    right_hand_side(system, work, scale)
-    solve_system(system, work, work.x, work.mu)
+    solve_residuals(system, work, scale)
     # Solutions in a run are corrections, with the sign of minus the residual.
     for j in range(n):
         out[j] = -work.x[j]

@@ -345,3 +345,10 @@ def right_hand_side(system, work, scale):
         work.x[j] = -work.f[j]
     for r in range(work.rows.size):
         work.mu[r] = -work.rows[r] * row_scale(system, r, work, scale)
+
+
+@inlined
+def solve_residuals(system, work, scale):
+    """Compute the correction for the residuals in work.f and work.rows into work.x and work.mu."""
+    right_hand_side(system, work, scale)
+    solve_system(system, work, work.x, work.mu)

@@ -50,8 +50,8 @@ class _Library(JITCodeLibrary):
         variables = [f'@"{each.name}" = common global ptr null' for each in module.global_variables if _is_kept(each)]
         if self.called_from_python:
             # No other function copies this code: names suffice to find it in the cache.
-            entries = [each.name for each in module.functions if _is_entry(each)]
-            stubs = [f'define void @"{name}"() {{ ret void }}' for name in entries]
+            entries = _defined(module, binding.Linkage.external)
+            stubs = [f'define void @"{each.name}"() {{ ret void }}' for each in entries]
             self._shared_module = _parsed(stubs + variables, module.name)
             _relink(module, binding.Linkage.linkonce_odr, binding.Linkage.internal)
         else:
@@ -143,14 +143,13 @@ def compiled(function: Callable[..., Any], *, quick: bool = False, **options: An
     return found
 
 
+def _defined(module: Any, linkage: binding.Linkage) -> list[Any]:
+    return [each for each in module.functions if not each.is_declaration and each.linkage == linkage]
+
+
 def _relink(module: Any, old: binding.Linkage, new: binding.Linkage) -> None:
-    for function in module.functions:
-        if not function.is_declaration and function.linkage == old:
-            function.linkage = new
-
-
-def _is_entry(function: Any) -> bool:
-    return not function.is_declaration and function.linkage == binding.Linkage.external
+    for function in _defined(module, old):
+        function.linkage = new
 
 
 def _is_kept(variable: Any) -> bool:

@@ -4,66 +4,22 @@ from __future__ import annotations
 
 from math import ceil, inf, pi, sqrt
 
-from paraflex.kernel.arrays import add, copy, fill
+from paraflex.kernel import indices as at, samples
+from paraflex.kernel.arrays import copy, fill, last_before
 from paraflex.kernel.bodies import stored_energy
 from paraflex.kernel.compiling import kernel, releases_lock, routine
 from paraflex.kernel.constraints import constraint_values, note_friction
 from paraflex.kernel.error import note_forces
 from paraflex.kernel.factor import factor_bodies
-from paraflex.kernel.linear import SINGULAR_PART, orient, right_hand_side, solve_system
+from paraflex.kernel.linear import SINGULAR_PART, orient
 from paraflex.kernel.metric import mass_norm
 from paraflex.kernel.near import note_crossing
 from paraflex.kernel.newmark import restart_algorithmic
 from paraflex.kernel.packed import INDEX_1
 from paraflex.kernel.projection import project
-from paraflex.kernel.run_state import (
-    BALANCE,
-    BAUMGARTE,
-    CYCLE,
-    DPHI_MAX,
-    DRIFTED,
-    ENERGY_0,
-    ENTERS,
-    ERROR_TEST,
-    FACTOR_B,
-    FAILURES,
-    FASTEST,
-    FINISHED,
-    HELD_END,
-    JUMPED,
-    LAST_ERROR,
-    LAST_STEP,
-    LAW_FAILED,
-    NEAR,
-    PART,
-    PART_END,
-    PAUSED,
-    PHI_MAX,
-    PREPARED,
-    PROJECTION,
-    REJECTED,
-    ROOT_RATE,
-    ROOT_STEP,
-    SAMPLE,
-    STEP,
-    STEPS,
-    STOP,
-    TIME,
-    TRIED,
-    WEIGHT_0,
-    WIDEST,
-    WORK,
-)
+from paraflex.kernel.run_state import BAUMGARTE, ENTERS, ERROR_TEST, FINISHED, LAW_FAILED, PAUSED, PROJECTION
 from paraflex.kernel.sampled import CHANGED, FAILED, SLACK, control, next_instant
-from paraflex.kernel.samples import (
-    is_long,
-    place_samples,
-    power_along_curve,
-    solve_samples,
-    step_work,
-    write_energies,
-)
-from paraflex.kernel.stage import equations
+from paraflex.kernel.stage import solve_linear
 from paraflex.kernel.step import attempt, input_power
 
 SAFETY, MIN_FACTOR, MAX_FACTOR = 0.8, 0.2, 2.0
@@ -97,19 +53,13 @@ def first_stage(system, signals, t, controls, march, work):
     note_friction(system, march.q, march.v, work.mu, work.compliance)
     factor_bodies(system, 0.0, march.q, work)
     orient(system, march.q, work, controls.dependent_part)
-    march.clock[FACTOR_B] = -1.0
-    if work.least[0] < SINGULAR_PART and march.counts[STEPS] > 0:
+    march.clock[at.FACTOR_B] = -1.0
+    if work.least[0] < SINGULAR_PART and march.counts[at.STEPS] > 0:
         return
     weights = INDEX_1
     if controls.treatment == BAUMGARTE and controls.gain == 0.0:
         weights = (1.0, 2.0 * controls.alpha, controls.beta * controls.beta)
-    # The equations are linear in a and lambda, with this matrix: the second pass only removes rounding.
-    for _ in range(2):
-        equations(system, signals, t, weights, march.q, march.v, a, lam, march.torques, work)
-        right_hand_side(system, work, 1.0)
-        solve_system(system, work, work.x, work.mu)
-        add(work.x, a)
-        add(work.mu, lam)
+    solve_linear(system, signals, t, weights, march.q, march.v, a, lam, march.torques, work)
 
 
 @routine
@@ -123,11 +73,11 @@ def enter(system, signals, t, controls, march, work):
     project(system, signals, t, march.q, march.v, work)
     for j in range(march.q.size):
         work.x[j] = march.q[j] - march.eq[j]
-    march.counts[PREPARED] = 1
+    march.counts[at.PREPARED] = 1
     if not mass_norm(system, work, work.x) <= ENTRY * controls.near_error:
         copy(march.eq, march.q)
         copy(march.ev, march.v)
-        march.counts[PREPARED] = -1
+        march.counts[at.PREPARED] = -1
         return
     copy(march.q, march.stage_q[0])
     copy(march.v, march.stage_v[0])
@@ -138,8 +88,8 @@ def enter(system, signals, t, controls, march, work):
 @routine
 def begin(system, signals, controls, march, work):
     """Compute the first stage of a run, or after a jump."""
-    t = march.clock[TIME]
-    march.counts[JUMPED] = 0
+    t = march.clock[at.TIME]
+    march.counts[at.JUMPED] = 0
     first_stage(system, signals, t, controls, march, work)
     a, lam = march.stage_a[1, 0], march.stage_lam[0]
     # Starting guesses must not extrapolate across a jump: stages before it do not count as other times.
@@ -149,9 +99,9 @@ def begin(system, signals, controls, march, work):
     copy(march.v, march.stage_v[0])
     copy(march.v, march.stage_d[0])
     copy(a, march.algorithmic[0])
-    march.clock[LAST_STEP], march.clock[LAST_ERROR] = 0.0, 1.0
-    march.clock[PART_END] = t
-    march.clock[ROOT_RATE], march.counts[ROOT_STEP] = 0.0, -1
+    march.clock[at.LAST_STEP], march.clock[at.LAST_ERROR] = 0.0, 1.0
+    march.clock[at.PART_END] = t
+    march.clock[at.ROOT_RATE], march.counts[at.ROOT_STEP] = 0.0, -1
     march.power[0] = input_power(system, signals, t, march.q, march.v, lam, march.torques, work)
     note_constraints(system, signals, t, march, work)
 
@@ -164,32 +114,32 @@ def resume(system, signals, controls, march, work, aside):
     step is much shorter than a step in which it would: the error estimate of a long step does not contain the effect of
     a jump.
     """
-    factor = march.clock[FACTOR_B]
+    factor = march.clock[at.FACTOR_B]
     copy(work.redundant, aside.redundant)
     copy(march.stage_a[1, 0], march.eq)
     begin(system, signals, controls, march, aside)
-    march.clock[FACTOR_B] = factor
+    march.clock[at.FACTOR_B] = factor
     for j in range(march.eq.size):
         march.eq[j] -= march.stage_a[1, 0, j]
     change = mass_norm(system, aside, march.eq)
-    if controls.fixed_step == 0.0 and change * march.clock[STEP] ** 2 > 2.0 * controls.tolerance:
-        march.clock[STEP] = AFTER_JUMP * sqrt(2.0 * controls.tolerance / change)
+    if controls.fixed_step == 0.0 and change * march.clock[at.STEP] ** 2 > 2.0 * controls.tolerance:
+        march.clock[at.STEP] = AFTER_JUMP * sqrt(2.0 * controls.tolerance / change)
 
 
 @kernel
 def start(system, signals, controls, march, work, out):
     """Compute the first stage and the first sample of a run."""
     begin(system, signals, controls, march, work)
-    t, a, lam = march.clock[TIME], march.stage_a[1, 0], march.stage_lam[0]
-    kinetic, strain, march.clock[WEIGHT_0] = stored_energy(system, march.q, march.v, lam, work.scratch)
-    march.clock[ENERGY_0] = kinetic + strain
+    t, a, lam = march.clock[at.TIME], march.stage_a[1, 0], march.stage_lam[0]
+    kinetic, strain, march.clock[at.WEIGHT_0] = stored_energy(system, march.q, march.v, lam, work.scratch)
+    march.clock[at.ENERGY_0] = kinetic + strain
     if out.times.size > 0 and out.times[0] <= t:
         copy(march.q, out.q[0])
         copy(march.v, out.v[0])
         copy(a, out.a[0])
         copy(lam, out.lam[0])
         out.energy[0, 0], out.energy[0, 1], out.energy[0, 2] = kinetic, strain, 0.0
-        march.counts[SAMPLE] = 1
+        march.counts[at.SAMPLE] = 1
 
 
 @routine
@@ -197,8 +147,8 @@ def note_constraints(system, signals, t, march, work):
     """Record the largest constraint violation at accepted steps."""
     constraint_values(system, signals, t, march.q, march.v, work.scratch, work.rows, work.mu)
     for r in range(work.rows.size):
-        march.clock[PHI_MAX] = max(march.clock[PHI_MAX], abs(work.rows[r]))
-        march.clock[DPHI_MAX] = max(march.clock[DPHI_MAX], abs(work.mu[r]))
+        march.clock[at.PHI_MAX] = max(march.clock[at.PHI_MAX], abs(work.rows[r]))
+        march.clock[at.DPHI_MAX] = max(march.clock[at.DPHI_MAX], abs(work.mu[r]))
 
 
 @routine
@@ -213,9 +163,9 @@ def note_cycle(system, controls, march):
     for i in range(system.bodies.size):
         o = system.bodies[i].offset
         rate = max(abs(march.v[o + 2]), sqrt(march.v[o] ** 2 + march.v[o + 1] ** 2) / system.size)
-        march.clock[FASTEST] = max(march.clock[FASTEST], rate)
-    if march.clock[FASTEST] * controls.span > TURN:
-        march.clock[CYCLE] = TURN / march.clock[FASTEST]
+        march.clock[at.FASTEST] = max(march.clock[at.FASTEST], rate)
+    if march.clock[at.FASTEST] * controls.span > TURN:
+        march.clock[at.CYCLE] = TURN / march.clock[at.FASTEST]
 
 
 @routine
@@ -224,16 +174,10 @@ def resolved(controls, t, h, march):
     for j in controls.turning:
         if abs(march.v[j]) * h > controls.turn_in_step:
             h = controls.turn_in_step / abs(march.v[j])
-    low, high = 0, controls.limit_t.size - 1
-    while low < high:
-        middle = (low + high + 1) // 2
-        if controls.limit_t[middle] <= t:
-            low = middle
-        else:
-            high = middle - 1
-    while low < controls.limit_t.size and controls.limit_t[low] < t + h:
-        h = min(h, max(controls.limit_h[low], controls.limit_t[low] - t))
-        low += 1
+    k = last_before(controls.limit_t, 0, controls.limit_t.size - 1, t)
+    while k < controls.limit_t.size and controls.limit_t[k] < t + h:
+        h = min(h, max(controls.limit_h[k], controls.limit_t[k] - t))
+        k += 1
     return h
 
 
@@ -241,20 +185,20 @@ def resolved(controls, t, h, march):
 def accept(system, signals, tableau, controls, t, h, march, work, out, aside):
     """Accept the step: advance, sample, count, and keep the stages for the next starting guess."""
     last = tableau.c.size - 1
-    if march.counts[NEAR] > 0:
+    if march.counts[at.NEAR] > 0:
         note_crossing(system, t, h, march, work)
-    if controls.treatment == PROJECTION and march.counts[NEAR] == 0:
+    if controls.treatment == PROJECTION and march.counts[at.NEAR] == 0:
         project(system, signals, t + h, march.stage_q[last], march.stage_v[last], work)
-    long = is_long(system, tableau, controls, h)
+    long = samples.is_long(system, tableau, controls, h)
     if long:
-        power_along_curve(system, signals, tableau, t, h, march, work)
-    first = place_samples(tableau, t, h, long, march, out)
-    solve_samples(system, signals, controls, t, h, first, march, work, out, aside)
-    write_energies(system, tableau, t, h, first, march, work, out)
+        samples.power_along_curve(system, signals, tableau, t, h, march, work)
+    first = samples.place_samples(tableau, t, h, long, march, out)
+    samples.solve_samples(system, signals, controls, t, h, first, march, work, out, aside)
+    samples.write_energies(system, tableau, t, h, first, march, work, out)
     copy(march.stage_q[last], march.q)
     copy(march.stage_v[last], march.v)
-    march.clock[WORK] += step_work(tableau, h, march)
-    march.clock[LAST_STEP] = h
+    march.clock[at.WORK] += samples.step_work(tableau, h, march)
+    march.clock[at.LAST_STEP] = h
     copy(march.stage_t[1], march.stage_t[0])
     for s in range(last + 1):
         copy(march.stage_a[1, s], march.stage_a[0, s])
@@ -266,17 +210,17 @@ def accept(system, signals, tableau, controls, t, h, march, work, out, aside):
     copy(march.stage_a[0, last], march.stage_a[1, 0])
     copy(march.stage_lam[last], march.stage_lam[0])
     march.power[0] = march.power[last]
-    march.counts[STEPS] += 1
-    march.counts[FAILURES] = 0
-    march.counts[DRIFTED] = march.counts[HELD_END]
-    if march.counts[NEAR] == 0:
-        march.counts[PREPARED] = 0
+    march.counts[at.STEPS] += 1
+    march.counts[at.FAILURES] = 0
+    march.counts[at.DRIFTED] = march.counts[at.HELD_END]
+    if march.counts[at.NEAR] == 0:
+        march.counts[at.PREPARED] = 0
     note_forces(controls, h, march)
     note_cycle(system, controls, march)
     kinetic, strain, weight = stored_energy(system, march.q, march.v, march.stage_lam[0], work.scratch)
-    done = march.clock[WORK] + weight - march.clock[WEIGHT_0]
-    balance = abs(kinetic + strain - march.clock[ENERGY_0] - done)
-    march.clock[BALANCE] = max(march.clock[BALANCE], balance)
+    done = march.clock[at.WORK] + weight - march.clock[at.WEIGHT_0]
+    balance = abs(kinetic + strain - march.clock[at.ENERGY_0] - done)
+    march.clock[at.BALANCE] = max(march.clock[at.BALANCE], balance)
     note_constraints(system, signals, t + h, march, work)
 
 
@@ -293,26 +237,26 @@ def march(system, signals, tableau, controls, stops, max_steps, march, work, slo
         PAUSED, FINISHED, LAW_FAILED, or the cause of a failure.
     """
     if law.counts.size == 0:
-        if march.counts[JUMPED] == 1:
+        if march.counts[at.JUMPED] == 1:
             resume(system, signals, controls, march, work, aside)
         return advance(system, signals, tableau, controls, stops, inf, 0.0, max_steps, march, work, slow, out, aside)
-    most = march.counts[STEPS] + march.counts[REJECTED] + max_steps
+    most = march.counts[at.STEPS] + march.counts[at.REJECTED] + max_steps
     while True:
-        t = march.clock[TIME]
+        t = march.clock[at.TIME]
         done = control(law, signals, t, march.q, march.v, march.stage_a[1, 0])
         if done == FAILED:
             return LAW_FAILED
-        taken = march.counts[STEPS] + march.counts[REJECTED]
+        taken = march.counts[at.STEPS] + march.counts[at.REJECTED]
         if done == CHANGED and taken == 0:
             start(system, signals, controls, march, work, out)
-        elif done == CHANGED or march.counts[JUMPED] == 1:
+        elif done == CHANGED or march.counts[at.JUMPED] == 1:
             resume(system, signals, controls, march, work, aside)
         pause = next_instant(law)
         code = advance(
             system, signals, tableau, controls, stops, pause, law.clock[SLACK], most - taken, march, work, slow, out,
             aside,
         )  # fmt: skip
-        if code != FINISHED or march.clock[TIME] >= stops[stops.size - 1]:
+        if code != FINISHED or march.clock[at.TIME] >= stops[stops.size - 1]:
             return code
 
 
@@ -321,18 +265,18 @@ def advance(system, signals, tableau, controls, stops, pause, slack, max_steps, 
     """Advance to the last of the stops, to a pause before it, or to a stop within a slack of the pause: see `march`."""
     exponent = 1.0 / tableau.order
     for _ in range(max_steps):
-        t = march.clock[TIME]
-        while march.counts[STOP] < stops.size and stops[march.counts[STOP]] <= t:
-            march.counts[STOP] += 1
-        if march.counts[STOP] == stops.size or t >= pause - slack:
+        t = march.clock[at.TIME]
+        while march.counts[at.STOP] < stops.size and stops[march.counts[at.STOP]] <= t:
+            march.counts[at.STOP] += 1
+        if march.counts[at.STOP] == stops.size or t >= pause - slack:
             return FINISHED
-        end, longest = stops[march.counts[STOP]], controls.fixed_step
+        end, longest = stops[march.counts[at.STOP]], controls.fixed_step
         if end > pause + slack:
             end = pause
-        if t < march.clock[PART_END]:
-            end, longest = march.clock[PART_END], march.clock[PART]
+        if t < march.clock[at.PART_END]:
+            end, longest = march.clock[at.PART_END], march.clock[at.PART]
         left = end - t
-        h = min(march.clock[STEP], controls.max_step)
+        h = min(march.clock[at.STEP], controls.max_step)
         landing = False
         if controls.fixed_step == 0.0:
             h = resolved(controls, t, h, march)
@@ -340,63 +284,63 @@ def advance(system, signals, tableau, controls, stops, pause, slack, max_steps, 
             # Divide intervals between stops evenly.
             h = left / max(1.0, ceil(left / longest - 1e-6))
             # If only rounding differs, keep the step size, and with it the factor.
-            if abs(h - march.clock[STEP]) <= 1e-9 * h:
-                h = march.clock[STEP]
-            march.clock[STEP] = h
+            if abs(h - march.clock[at.STEP]) <= 1e-9 * h:
+                h = march.clock[at.STEP]
+            march.clock[at.STEP] = h
         if left <= h * (1.0 + 1e-9):
             h, landing = left, True
         elif left < 2.0 * h and controls.fixed_step == 0.0:
             h = 0.5 * left
         # After a jump, if only rounding differs, keep the step size before it, and with it the factor.
-        if march.clock[LAST_STEP] == 0.0 and abs(h - march.clock[TRIED]) <= SAME_STEP * h:
-            h = march.clock[TRIED]
-        march.clock[TRIED] = h
+        if march.clock[at.LAST_STEP] == 0.0 and abs(h - march.clock[at.TRIED]) <= SAME_STEP * h:
+            h = march.clock[at.TRIED]
+        march.clock[at.TRIED] = h
         cause, error = attempt(system, signals, tableau, controls, t, h, march, work, slow)
         if cause == ENTERS:
             enter(system, signals, t, controls, march, work)
             continue
         if cause == PAUSED and error <= 1.0:
-            after_failure = march.counts[FAILURES] > 0
+            after_failure = march.counts[at.FAILURES] > 0
             accept(system, signals, tableau, controls, t, h, march, work, out, aside)
-            march.clock[TIME] = end if landing else t + h
+            march.clock[at.TIME] = end if landing else t + h
             if controls.fixed_step > 0.0:
                 continue
             # Near a singular position the step size is constant, and not so small that rounding dominates.
-            if march.counts[NEAR] > 0:
-                pace = abs(march.clock[ROOT_RATE]) * h
-                if pace < LEAST_PACE * sqrt(march.clock[WIDEST]) and error < GROWING and not after_failure:
-                    march.clock[STEP] = MAX_FACTOR * h
+            if march.counts[at.NEAR] > 0:
+                pace = abs(march.clock[at.ROOT_RATE]) * h
+                if pace < LEAST_PACE * sqrt(march.clock[at.WIDEST]) and error < GROWING and not after_failure:
+                    march.clock[at.STEP] = MAX_FACTOR * h
                 continue
             error = max(error, SMALLEST_ERROR) / SAFETY**tableau.order
-            factor = error ** (-BY_ERROR * exponent) * march.clock[LAST_ERROR] ** (BY_LAST_ERROR * exponent)
+            factor = error ** (-BY_ERROR * exponent) * march.clock[at.LAST_ERROR] ** (BY_LAST_ERROR * exponent)
             factor = min(MAX_FACTOR, factor)
-            march.clock[LAST_ERROR] = error
+            march.clock[at.LAST_ERROR] = error
             # Keep the step size, and with it the factor, unless the change is worth it; a step reduced to end at a stop
             # gives no information about longer ones.
-            grows = h >= march.clock[STEP] and not after_failure and work.least[0] > LEAST_PART
+            grows = h >= march.clock[at.STEP] and not after_failure and work.least[0] > LEAST_PART
             if factor < KEEP_ABOVE or (factor > KEEP_BELOW and grows):
-                march.clock[STEP] = factor * h
+                march.clock[at.STEP] = factor * h
             continue
-        march.counts[REJECTED] += 1
+        march.counts[at.REJECTED] += 1
         if controls.fixed_step > 0.0:
             if h <= SMALLEST_PART * controls.fixed_step:
                 return cause
-            if t >= march.clock[PART_END]:
-                march.clock[PART_END] = end if landing else t + h
-            march.clock[PART] = MIN_FACTOR * h
-        if march.counts[FAILURES] == 1:
+            if t >= march.clock[at.PART_END]:
+                march.clock[at.PART_END] = end if landing else t + h
+            march.clock[at.PART] = MIN_FACTOR * h
+        if march.counts[at.FAILURES] == 1:
             # The first stage is the last stage of the previous step; its error may be too large for a shorter step.
             first_stage(system, signals, t, controls, march, work)
             if tableau.newmark.size > 0:
                 restart_algorithmic(tableau.newmark, march)
-        march.counts[FAILURES] += 1
+        march.counts[at.FAILURES] += 1
         if controls.fixed_step > 0.0:
             continue
         if cause == PAUSED:
             cause = ERROR_TEST
-            march.clock[STEP] = h * max(MIN_FACTOR, SAFETY * (1.0 / error) ** exponent)
+            march.clock[at.STEP] = h * max(MIN_FACTOR, SAFETY * (1.0 / error) ** exponent)
         else:
-            march.clock[STEP] = h * MIN_FACTOR
-        if march.clock[STEP] < controls.least_step:
+            march.clock[at.STEP] = h * MIN_FACTOR
+        if march.clock[at.STEP] < controls.least_step:
             return cause
     return PAUSED

@@ -12,25 +12,13 @@ from __future__ import annotations
 
 from math import sqrt
 
+from paraflex.kernel import indices as at
 from paraflex.kernel.arrays import add, copy, fill
 from paraflex.kernel.compiling import inlined, routine
 from paraflex.kernel.constraints import constraint_values
 from paraflex.kernel.linear import own_square, solve_system
 from paraflex.kernel.metric import mass_norm
 from paraflex.kernel.projection import NO_VIOLATION, largest_violation, least_change
-from paraflex.kernel.run_state import (
-    DRIFTED,
-    HELD_END,
-    LAST_STEP,
-    NEAR,
-    PASSAGES,
-    ROOT,
-    ROOT_B,
-    ROOT_RATE,
-    ROOT_STEP,
-    STEPS,
-    WIDEST,
-)
 
 # A run is near a singular position if it could reach it within this many steps, or if the root is less than this part
 # of its largest value so far; in either case only if the relative pivot is less than this part of its largest value.
@@ -54,8 +42,8 @@ FAR = 10.0
 @inlined
 def elastic_measure_changes(system, b, march):
     """Return whether this is a step's first attempt with a b other than the last step's, with elastic links."""
-    first = 0 <= march.counts[ROOT_STEP] < march.counts[STEPS]
-    return first and b != march.clock[ROOT_B] and system.modal.size > 0
+    first = 0 <= march.counts[at.ROOT_STEP] < march.counts[at.STEPS]
+    return first and b != march.clock[at.ROOT_B] and system.modal.size > 0
 
 
 @routine
@@ -67,32 +55,34 @@ def note_root(system, march, work):
     the values that the root is compared with.
     """
     root, change, b = sqrt(max(work.least[0], 0.0)), 0.0, work.step[0]
-    if march.counts[ROOT_STEP] == march.counts[STEPS]:
-        before = abs(march.clock[ROOT])
-        if system.modal.size > 0 and b != march.clock[ROOT_B] and before > 0.0:
-            widest = march.clock[WIDEST] * (root / before) ** 2
-            march.clock[WIDEST] = max(work.least[0], min(1.0, widest))
-            march.clock[ROOT] *= root / before
-            march.clock[ROOT_B] = b
+    if march.counts[at.ROOT_STEP] == march.counts[at.STEPS]:
+        before = abs(march.clock[at.ROOT])
+        if system.modal.size > 0 and b != march.clock[at.ROOT_B] and before > 0.0:
+            widest = march.clock[at.WIDEST] * (root / before) ** 2
+            march.clock[at.WIDEST] = max(work.least[0], min(1.0, widest))
+            march.clock[at.ROOT] *= root / before
+            march.clock[at.ROOT_B] = b
         return
-    if march.counts[ROOT_STEP] >= 0:
-        change = (root - march.clock[ROOT]) / march.clock[LAST_STEP]
-    size = max(abs(change), FORGETTING * abs(march.clock[ROOT_RATE]))
-    march.clock[ROOT_RATE] = size if change > 0.0 else -size
-    march.clock[ROOT], march.counts[ROOT_STEP], march.clock[ROOT_B] = root, march.counts[STEPS], b
-    march.clock[WIDEST] = max(march.clock[WIDEST], work.least[0])
+    if march.counts[at.ROOT_STEP] >= 0:
+        change = (root - march.clock[at.ROOT]) / march.clock[at.LAST_STEP]
+    size = max(abs(change), FORGETTING * abs(march.clock[at.ROOT_RATE]))
+    march.clock[at.ROOT_RATE] = size if change > 0.0 else -size
+    march.clock[at.ROOT], march.counts[at.ROOT_STEP], march.clock[at.ROOT_B] = root, march.counts[at.STEPS], b
+    march.clock[at.WIDEST] = max(march.clock[at.WIDEST], work.least[0])
 
 
 @routine
 def comes_near(h, march):
     """Return whether a step begins near a singular position."""
-    return march.clock[ROOT] < max(NEAR_STEPS * abs(march.clock[ROOT_RATE]) * h, NEAR_ROOT * sqrt(march.clock[WIDEST]))
+    return march.clock[at.ROOT] < max(
+        NEAR_STEPS * abs(march.clock[at.ROOT_RATE]) * h, NEAR_ROOT * sqrt(march.clock[at.WIDEST])
+    )
 
 
 @routine
 def share_of_passage(h, march):
     """Return the fraction of the passage through a singular position that a step covers."""
-    return min(1.0, abs(march.clock[ROOT_RATE]) * h / (NEAR_ROOT * sqrt(march.clock[WIDEST])))
+    return min(1.0, abs(march.clock[at.ROOT_RATE]) * h / (NEAR_ROOT * sqrt(march.clock[at.WIDEST])))
 
 
 @routine
@@ -105,9 +95,9 @@ def trust(weights, g, b, ahead, march):
     the start of the step.
     """
     lag = (2.0 * weights[0] * g + weights[1] * b) / (weights[0] + weights[1] * g + weights[2] * b)
-    speed = abs(march.clock[ROOT_RATE])
+    speed = abs(march.clock[at.ROOT_RATE])
     held = min(max(HELD * lag, LEAST_HELD * g) * speed, MOST_HELD)
-    before = march.clock[ROOT_RATE] < 0.0 and march.clock[ROOT] > speed * ahead
+    before = march.clock[at.ROOT_RATE] < 0.0 and march.clock[at.ROOT] > speed * ahead
     return held, -lag * speed if before else lag * speed
 
 
@@ -173,17 +163,17 @@ def return_to_constraints(system, signals, t, held, march, work):
     q, v = march.stage_q[last], march.stage_v[last]
     constraint_values(system, signals, t, q, v, work.scratch, work.rows, work.mu)
     distance = damped_distance(system, work.rows, held, work)
-    if march.clock[ROOT_RATE] != 0.0:
+    if march.clock[at.ROOT_RATE] != 0.0:
         constraint_values(system, signals, t, q, v, work.scratch, work.mu, work.rows)
-        distance = max(distance, held / abs(march.clock[ROOT_RATE]) * damped_distance(system, work.rows, held, work))
-    march.counts[HELD_END] = 1 if work.least[0] < held * held else 0
+        distance = max(distance, held / abs(march.clock[at.ROOT_RATE]) * damped_distance(system, work.rows, held, work))
+    march.counts[at.HELD_END] = 1 if work.least[0] < held * held else 0
     for _ in range(PASSES):
         constraint_values(system, signals, t, q, v, work.scratch, work.rows, work.mu)
         remove_violation(system, held, q, work)
     for _ in range(PASSES):
         constraint_values(system, signals, t, q, v, work.scratch, work.mu, work.rows)
         remove_violation(system, held, v, work)
-    return distance * LEAVING if march.counts[DRIFTED] > 0 else distance
+    return distance * LEAVING if march.counts[at.DRIFTED] > 0 else distance
 
 
 @routine
@@ -208,8 +198,8 @@ def damped_distance(system, rows, held, work):
 @routine
 def begin_near(system, march, work):
     """Store the direction that opens the row nearest to dependence, at the start of a step near a singular position."""
-    march.counts[NEAR] = 1 + int(work.least[1])
-    open_row(system, march.counts[NEAR] - 1, work)
+    march.counts[at.NEAR] = 1 + int(work.least[1])
+    open_row(system, march.counts[at.NEAR] - 1, work)
     copy(work.x, march.opening)
 
 
@@ -228,7 +218,7 @@ def open_row(system, row, work):
 @routine
 def note_crossing(system, t, h, march, work):
     """Record the passage of a singular position if the opening direction changes sign in a step, through infinity."""
-    open_row(system, march.counts[NEAR] - 1, work)
+    open_row(system, march.counts[at.NEAR] - 1, work)
     product, start, end = 0.0, 0.0, 0.0
     for j in range(work.x.size):
         product += march.opening[j] * work.x[j]
@@ -236,31 +226,33 @@ def note_crossing(system, t, h, march, work):
         end += work.x[j] * work.x[j]
     if product >= 0.0:
         return
-    march.clock[ROOT] = -march.clock[ROOT]
+    march.clock[at.ROOT] = -march.clock[at.ROOT]
     # Both directions grow as the inverse of the time from the position.
     note_position(t + h * sqrt(end) / (sqrt(start) + sqrt(end)), t, h, march)
 
 
 @routine
-def note_position(at, t, h, march):
+def note_position(time, t, h, march):
     """Record that a step from t reached a singular position, with an interval of the step's length on both sides."""
-    last, around = march.counts[PASSAGES] - 1, max(at - t, t + h - at)
-    if last >= 0:
-        if abs(0.5 * (march.passages[0, last] + march.passages[1, last]) - at) < SAME_POSITION * h:
-            return
-    if last + 1 < march.passages.shape[1]:
-        march.passages[0, last + 1], march.passages[1, last + 1] = at - around, at + around
-        march.counts[PASSAGES] += 1
+    last, around = march.counts[at.PASSAGES] - 1, max(time - t, t + h - time)
+    if last < 0 or abs(0.5 * (march.passages[0, last] + march.passages[1, last]) - time) >= SAME_POSITION * h:
+        add_passage(time - around, time + around, march)
 
 
 @routine
 def note_passage(t, h, march):
     """Record the interval of a singular position; adjacent steps form one interval."""
-    last = march.counts[PASSAGES] - 1
-    if last >= 0:
-        if t <= march.passages[1, last]:
-            march.passages[1, last] = max(t + h, march.passages[1, last])
-            return
-    if last + 1 < march.passages.shape[1]:
-        march.passages[0, last + 1], march.passages[1, last + 1] = t, t + h
-        march.counts[PASSAGES] += 1
+    last = march.counts[at.PASSAGES] - 1
+    if last >= 0 and t <= march.passages[1, last]:
+        march.passages[1, last] = max(t + h, march.passages[1, last])
+    else:
+        add_passage(t, t + h, march)
+
+
+@inlined
+def add_passage(start, end, march):
+    """Add an interval to those of singular positions, unless there is no room."""
+    count = march.counts[at.PASSAGES]
+    if count < march.passages.shape[1]:
+        march.passages[0, count], march.passages[1, count] = start, end
+        march.counts[at.PASSAGES] += 1

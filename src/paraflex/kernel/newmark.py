@@ -11,11 +11,11 @@ there, and projects its result at t + h onto the constraints and their two deriv
 
 from __future__ import annotations
 
+from paraflex.kernel import indices as at
 from paraflex.kernel.arrays import add, copy
 from paraflex.kernel.compiling import routine
 from paraflex.kernel.packed import CONSTRAINT, INDEX_1
 from paraflex.kernel.projection import least_change, project
-from paraflex.kernel.run_state import ALPHA_F, ALPHA_M, BETA, GAMMA, LAST_STEP, THETA
 from paraflex.kernel.stage import equations
 
 
@@ -25,14 +25,14 @@ def newmark_start(numbers, t, h, march):
 
     Returns its time, and g and b of q = q* + b v', v = v* + g v'.
     """
-    a0, theta = march.algorithmic[0], numbers[THETA]
+    a0, theta = march.algorithmic[0], numbers[at.THETA]
     if theta > 1.0:
         h = theta * h
         for j in range(march.q.size):
             march.qs[j] = march.q[j] + h * march.v[j] + h * h / 3.0 * a0[j]
             march.vs[j] = march.v[j] + 0.5 * h * a0[j]
         return t + h, 0.5 * h, h * h / 6.0
-    alpha_m, alpha_f, beta, gamma = numbers[ALPHA_M], numbers[ALPHA_F], numbers[BETA], numbers[GAMMA]
+    alpha_m, alpha_f, beta, gamma = numbers[at.ALPHA_M], numbers[at.ALPHA_F], numbers[at.BETA], numbers[at.GAMMA]
     part = (1.0 - alpha_f) / (1.0 - alpha_m)
     moved = shifted(alpha_m - alpha_f, h, march)
     for j in range(march.q.size):
@@ -46,14 +46,14 @@ def newmark_start(numbers, t, h, march):
 @routine
 def shifted(where, h, march):
     """Return the fraction of the last step's change of acceleration to add if the step size changes."""
-    last = march.clock[LAST_STEP]
+    last = march.clock[at.LAST_STEP]
     return where * (h - last) / last if last > 0.0 else 0.0
 
 
 @routine
 def restart_algorithmic(numbers, march):
     """Set the algorithmic acceleration from true accelerations, after steps that were divided."""
-    where = numbers[ALPHA_M] - numbers[ALPHA_F] if march.clock[LAST_STEP] > 0.0 else 0.0
+    where = numbers[at.ALPHA_M] - numbers[at.ALPHA_F] if march.clock[at.LAST_STEP] > 0.0 else 0.0
     for j in range(march.q.size):
         a = march.stage_a[1, 0, j]
         march.algorithmic[0, j] = a + where * (a - march.stage_a[0, 0, j])
@@ -66,14 +66,14 @@ def newmark_end(system, signals, numbers, varying, t, h, march, work):
     If the step size varies, and with Wilson's method, velocities and algorithmic accelerations are projected onto their
     constraints: a step corrects the Phi' that the previous step has left, and if it is shorter, by a larger force.
     """
-    if numbers[THETA] > 1.0:
-        wilson_end(numbers[THETA], h, march, work)
+    if numbers[at.THETA] > 1.0:
+        wilson_end(numbers[at.THETA], h, march, work)
     else:
         carry(numbers, h, march)
-    if numbers[THETA] > 1.0 or varying:
+    if numbers[at.THETA] > 1.0 or varying:
         project(system, signals, t + h, work.q, work.v, work)
         allow_acceleration(system, signals, t + h, march.algorithmic[1], march, work)
-    if numbers[THETA] > 1.0:
+    if numbers[at.THETA] > 1.0:
         copy(march.algorithmic[1], march.stage_a[1, 1])
 
 
@@ -81,7 +81,7 @@ def newmark_end(system, signals, numbers, varying, t, h, march, work):
 def carry(numbers, h, march):
     """Compute the new algorithmic acceleration from the old one and the accelerations at both ends."""
     a0, a1, start, end = march.algorithmic[0], march.algorithmic[1], march.stage_a[1, 0], march.stage_a[1, 1]
-    alpha_m, alpha_f = numbers[ALPHA_M], numbers[ALPHA_F]
+    alpha_m, alpha_f = numbers[at.ALPHA_M], numbers[at.ALPHA_F]
     moved = shifted(alpha_m - alpha_f, h, march)
     for j in range(march.q.size):
         a = a0[j] + moved * (start[j] - march.stage_a[0, 0, j])

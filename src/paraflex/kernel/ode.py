@@ -5,19 +5,21 @@ A third part is added to (q, v), the work done so far, so that a solver integrat
 
 from __future__ import annotations
 
-from paraflex.kernel.arrays import add, copy, fill
+from paraflex.kernel.arrays import copy, fill
 from paraflex.kernel.compiling import kernel, routine
 from paraflex.kernel.constraints import constraint_values, note_friction
 from paraflex.kernel.factor import factor_bodies
-from paraflex.kernel.linear import orient, right_hand_side, solve_system
+from paraflex.kernel.linear import orient, solve_residuals
 from paraflex.kernel.packed import CONSTRAINT, INDEX_1
-from paraflex.kernel.stage import equations
+from paraflex.kernel.stage import equations, solve_linear
 from paraflex.kernel.step import input_power
 from paraflex.kernel.tangent import note_slopes, reaction_tangent, residual_tangent
 
 # Value of b for rows of springs and dampers that determine their forces independently of the accelerations: the rows
 # are divided by b or by its square root, and both must be negligible beside 1.
 INSTANT_B = 1e-36
+# Weights of Phi'', Phi' and Phi for constraints on velocities, and on positions.
+SPEEDS, PLACES = (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
 
 
 @kernel
@@ -35,13 +37,7 @@ def accelerations(system, signals, t, weights, q, v, a, lam, torques, work, depe
     factor_bodies(system, 0.0, q, work)
     work.step[0] = INSTANT_B
     dependent = orient(system, q, work, dependent_part)
-    # The equations are linear in a and lambda, with this matrix: the second pass only removes rounding.
-    for _ in range(2):
-        equations(system, signals, t, weights, q, v, a, lam, torques, work)
-        right_hand_side(system, work, 1.0)
-        solve_system(system, work, work.x, work.mu)
-        add(work.x, a)
-        add(work.mu, lam)
+    solve_linear(system, signals, t, weights, q, v, a, lam, torques, work)
     return dependent
 
 
@@ -85,8 +81,7 @@ def rates_jacobian(system, weights, y, a, lam, torques, work, direction, out):
                 one[j] = 0.0
                 copy(direction.f, work.f)
                 copy(direction.rows, work.rows)
-                right_hand_side(system, work, 1.0)
-                solve_system(system, work, work.x, work.mu)
+                solve_residuals(system, work, 1.0)
                 column = part * n + j
                 for k in range(n):
                     out[n + k, column] = work.x[k]
@@ -111,7 +106,7 @@ def descriptor_residual(system, signals, t, weights, y, dy, dropped, torques, wo
         out[n + j] = work.f[j]
     for r in range(m):
         out[2 * n + r] = lam[r] if dropped[r] else work.rows[r]
-    out[2 * n + m] = dy[2 * n + m] - input_power(system, signals, t, q, v, lam, torques, work)
+    out[-1] = dy[-1] - input_power(system, signals, t, q, v, lam, torques, work)
 
 
 @kernel
@@ -122,7 +117,7 @@ def descriptor_jacobian(system, weights, y, dy, c, dropped, torques, work, direc
     """
     n, m = work.f.size, work.rows.size
     q, v, a, lam = y[:n], y[n : 2 * n], dy[n : 2 * n], y[2 * n : 2 * n + m]
-    for j in range(2 * n + m + 1):
+    for j in range(y.size):
         fill(out[j], 0.0)
     note_slopes(system, q, v, work.mu, work.compliance, direction)
     for i in range(system.bodies.size):
@@ -142,7 +137,7 @@ def descriptor_jacobian(system, weights, y, dy, c, dropped, torques, work, direc
         direction.lam[r] = 0.0
         fill_column(direction, n, 2 * n, 2 * n + r, out)
     drop_rows(dropped, 2 * n, 2 * n, out)
-    out[2 * n + m, 2 * n + m] = c
+    out[-1, -1] = c
 
 
 @routine
@@ -171,24 +166,19 @@ def stabilised_residual(system, signals, t, y, dy, dropped, weight, torques, idl
     Leimkuhler 1985). W is the diagonal `weight` (n,). Rows that are not constraints replace their Phi', and have no mu.
     """
     n, m = work.f.size, work.rows.size
-    q, v, a = y[:n], y[n : 2 * n], dy[n : 2 * n]
-    lam, mu = y[2 * n : 2 * n + m], y[2 * n + m : 2 * n + 2 * m]
-    note_friction(system, q, v, work.mu, work.compliance)
-    equations(system, signals, t, INDEX_1, q, v, a, lam, torques, work)
+    q, v, lam, mu = y[:n], y[n : 2 * n], y[2 * n : 2 * n + m], y[2 * n + m : 2 * n + 2 * m]
+    descriptor_residual(system, signals, t, INDEX_1, y, dy, dropped, torques, work, out)
     constraint_values(system, signals, t, q, v, work.scratch, phi, dphi)
     for r in range(m):
         free = dropped[r] or system.rows[r].kind != CONSTRAINT
         direction.lam[r] = 0.0 if free else mu[r]
         out[2 * n + m + r] = mu[r] if free else phi[r]
-        out[2 * n + r] = dphi[r] if system.rows[r].kind == CONSTRAINT else work.rows[r]
-        if dropped[r]:
-            out[2 * n + r] = lam[r]
-    reaction_tangent(system, (0.0, 0.0, 1.0), q, idle, idle, lam, idle, 0, system.bodies.size, direction)
+        if not free:
+            out[2 * n + r] = dphi[r]
+    reaction_tangent(system, PLACES, q, idle, idle, lam, idle, 0, system.bodies.size, direction)
     for j in range(n):
-        out[j] = weight[j] * (dy[j] - v[j]) + direction.f[j]
-        out[n + j] = work.f[j]
+        out[j] = weight[j] * out[j] + direction.f[j]
     fill(direction.lam, 0.0)
-    out[2 * n + 2 * m] = dy[2 * n + 2 * m] - input_power(system, signals, t, q, v, lam, torques, work)
 
 
 @kernel
@@ -198,39 +188,23 @@ def stabilised_jacobian(system, y, dy, c, dropped, weight, torques, idle, work, 
     `out` is square, with a row for each entry of y; `direction` is scratch.
     """
     n, m = work.f.size, work.rows.size
-    q, v, a = y[:n], y[n : 2 * n], dy[n : 2 * n]
-    lam, mu = y[2 * n : 2 * n + m], y[2 * n + m : 2 * n + 2 * m]
-    speeds, places = (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
-    for j in range(2 * n + 2 * m + 1):
-        fill(out[j], 0.0)
-    note_slopes(system, q, v, work.mu, work.compliance, direction)
+    q, mu = y[:n], y[2 * n + m : 2 * n + 2 * m]
+    descriptor_jacobian(system, SPEEDS, y, dy, c, dropped, torques, work, direction, out)
     for i in range(system.bodies.size):
         for j in range(system.bodies[i].offset, system.bodies[i].offset + 3 + system.bodies[i].nf):
             direction.q[j] = 1.0
-            residual_tangent(system, speeds, q, v, a, lam, torques, work.compliance, i, i + 1, direction)
-            fill_column(direction, n, 2 * n, j, out)
-            reaction_tangent(system, places, q, idle, idle, mu, idle, i, i + 1, direction)
+            reaction_tangent(system, PLACES, q, idle, idle, mu, idle, i, i + 1, direction)
             direction.q[j] = 0.0
             fill_column(direction, 0, 2 * n + m, j, out)
-            direction.v[j], direction.a[j] = 1.0, c
-            residual_tangent(system, speeds, q, v, a, lam, torques, work.compliance, i, i + 1, direction)
-            direction.v[j], direction.a[j] = 0.0, 0.0
-            fill_column(direction, n, 2 * n, n + j, out)
             out[j, j] += weight[j] * c
             out[j, n + j] = -weight[j]
     for r in range(m):
-        direction.lam[r] = 1.0
-        residual_tangent(system, speeds, q, v, a, lam, torques, work.compliance, 0, system.bodies.size, direction)
-        fill_column(direction, n, 2 * n, 2 * n + r, out)
-        if not dropped[r] and system.rows[r].kind == CONSTRAINT:
-            reaction_tangent(system, places, q, idle, idle, mu, idle, 0, system.bodies.size, direction)
-            fill_column(direction, 0, 2 * n + m, 2 * n + m + r, out)
-        else:
-            fill(out[2 * n + m + r], 0.0)
-        direction.lam[r] = 0.0
-    for r in range(m):
+        row = 2 * n + m + r
         if dropped[r] or system.rows[r].kind != CONSTRAINT:
-            fill(out[2 * n + m + r], 0.0)
-            out[2 * n + m + r, 2 * n + m + r] = 1.0
-    drop_rows(dropped, 2 * n, 2 * n, out)
-    out[2 * n + 2 * m, 2 * n + 2 * m] = c
+            fill(out[row], 0.0)
+            out[row, row] = 1.0
+        else:
+            direction.lam[r] = 1.0
+            reaction_tangent(system, PLACES, q, idle, idle, mu, idle, 0, system.bodies.size, direction)
+            direction.lam[r] = 0.0
+            fill_column(direction, 0, 2 * n + m, row, out)

@@ -8,12 +8,12 @@ its joint; a linear motor is an axis.
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from paraflex.kernel.arrays import apart
+from paraflex.kernel.arrays import Floats, allocated, apart
 from paraflex.kernel.compiling import by_reference
 from paraflex.kernel.vectors import padded
 
@@ -30,82 +30,75 @@ INDEX_1 = (1.0, 0.0, 0.0)
 # Rows of Workspace.flex: M_phif and 1/(1 + b omega^2).
 MPF, DINV = range(2)
 
-BODY = np.dtype(
-    [
-        ("offset", np.int64),  # first coordinate of the body in q
-        ("nf", np.int64),
-        ("flex", np.int64),  # first column of the body in `modal` and `Workspace.flex`
-        ("square", np.int64),  # first entry of its nf x nf matrices
-        ("port", np.int64),  # first of its ports, port .. port_end - 1
-        ("port_end", np.int64),
-        ("motor", np.int64),  # first of its sides of rotary motors, motor .. motor_end - 1
-        ("motor_end", np.int64),
-        ("columns", np.int64),  # first entry of its nf x width matrix in `columns`
-        ("width", np.int64),
-        ("products", np.int64),  # first entry of its nf x 2 stride matrix in `products`
-        ("stride", np.int64),
-        ("damping", np.int64),  # first entry of its nf x stride matrix in `damping`, -1 where damping is diagonal
-        ("block", np.int64),  # first entry of its parts x lanes block J M^-1 J^T in Workspace.blocks
-        ("parts", np.int64),  # rows of its ports' Jacobians
-        ("lanes", np.int64),  # columns of `Workspace.jac` and `Workspace.response`: these rows and three more, padded
-        ("jac", np.int64),  # first entry of its (3 + nf) x lanes matrices there
-        ("points", np.int64),  # number of its mass points in second-order geometry, 0 in linear geometry
-        ("slopes", np.int64),  # number of Gauss points, which come first among the mass points
-        ("pitch", np.int64),  # number of its mass points, padded
-        ("places", np.int64),  # first entry of its nf x 3 pitch matrix in `places`
-        ("spans", np.int64),  # first entry of its slopes x pitch matrix in `spans`
-        ("inertias", np.int64),  # first entry of its 3 x pitch matrix in `inertias`
-        # 1 if its iteration matrix is dense: in second-order geometry, or if damping couples its modes.
-        ("full", np.int64),
-        ("dense", np.int64),  # first entry of its (3 + nf) x (3 + nf) matrices in the workspace
-        ("inverse", np.int64),  # first entry of its inverse in the workspace, with padded rows
-        ("m", np.float64),
-        ("S1x", np.float64),
-        ("S1y", np.float64),
-        ("I0", np.float64),  # I0 + J, with the lumped moments of inertia
-    ],
-    align=True,
+
+def _record(*fields: tuple[str, type]) -> np.dtype[np.void]:
+    return np.dtype(list(fields), align=True)
+
+
+BODY = _record(
+    ("offset", np.int64),  # first coordinate of the body in q
+    ("nf", np.int64),
+    ("flex", np.int64),  # first column of the body in `modal` and `Workspace.flex`
+    ("square", np.int64),  # first entry of its nf x nf matrices
+    ("port", np.int64),  # first of its ports, port .. port_end - 1
+    ("port_end", np.int64),
+    ("motor", np.int64),  # first of its sides of rotary motors, motor .. motor_end - 1
+    ("motor_end", np.int64),
+    ("columns", np.int64),  # first entry of its nf x width matrix in `columns`
+    ("width", np.int64),
+    ("products", np.int64),  # first entry of its nf x 2 stride matrix in `products`
+    ("stride", np.int64),
+    ("damping", np.int64),  # first entry of its nf x stride matrix in `damping`, -1 where damping is diagonal
+    ("block", np.int64),  # first entry of its parts x lanes block J M^-1 J^T in Workspace.blocks
+    ("parts", np.int64),  # rows of its ports' Jacobians
+    ("lanes", np.int64),  # columns of `Workspace.jac` and `Workspace.response`: these rows and three more, padded
+    ("jac", np.int64),  # first entry of its (3 + nf) x lanes matrices there
+    ("points", np.int64),  # number of its mass points in second-order geometry, 0 in linear geometry
+    ("slopes", np.int64),  # number of Gauss points, which come first among the mass points
+    ("pitch", np.int64),  # number of its mass points, padded
+    ("places", np.int64),  # first entry of its nf x 3 pitch matrix in `places`
+    ("spans", np.int64),  # first entry of its slopes x pitch matrix in `spans`
+    ("inertias", np.int64),  # first entry of its 3 x pitch matrix in `inertias`
+    # 1 if its iteration matrix is dense: in second-order geometry, or if damping couples its modes.
+    ("full", np.int64),
+    ("dense", np.int64),  # first entry of its (3 + nf) x (3 + nf) matrices in the workspace
+    ("inverse", np.int64),  # first entry of its inverse in the workspace, with padded rows
+    ("m", np.float64),
+    ("S1x", np.float64),
+    ("S1y", np.float64),
+    ("I0", np.float64),  # I0 + J, with the lumped moments of inertia
 )
-MARKER = np.dtype(
-    [
-        ("body", np.int64),
-        ("shape", np.int64),  # first column of its rows in `shape`
-        ("column", np.int64),  # its column x in `columns`, followed by y and slope
-        ("bending", np.int64),  # first entry of its matrix in `bending`, -1 if it has none
-        ("x", np.float64),
-        ("y", np.float64),
-    ],
-    align=True,
+MARKER = _record(
+    ("body", np.int64),
+    ("shape", np.int64),  # first column of its rows in `shape`
+    ("column", np.int64),  # its column x in `columns`, followed by y and slope
+    ("bending", np.int64),  # first entry of its matrix in `bending`, -1 if it has none
+    ("x", np.float64),
+    ("y", np.float64),
 )
-PORT = np.dtype(
-    [
-        ("marker", np.int64),
-        ("kind", np.int64),
-        ("row", np.int64),  # first constraint row
-        ("rows", np.int64),  # 2 for a point, else 1
-        # Number of rows in the body frame that these are computed from: x and y of a point; an angle; x and y of an
-        # axis, and if the body carries the axis also the angle, and the deflection along a track.
-        ("parts", np.int64),
-        ("local", np.int64),  # index of the first of them among those of its body
-        ("axis", np.int64),  # axis of which it is an end, -1 for none
-        # Factor of its contribution to the row: for a joint +1 on side b, -1 on side a.
-        ("weight", np.float64),
-    ],
-    align=True,
+PORT = _record(
+    ("marker", np.int64),
+    ("kind", np.int64),
+    ("row", np.int64),  # first constraint row
+    ("rows", np.int64),  # 2 for a point, else 1
+    # Number of rows in the body frame that these are computed from: x and y of a point; an angle; x and y of an
+    # axis, and if the body carries the axis also the angle, and the deflection along a track.
+    ("parts", np.int64),
+    ("local", np.int64),  # index of the first of them among those of its body
+    ("axis", np.int64),  # axis of which it is an end, -1 for none
+    # Factor of its contribution to the row: for a joint +1 on side b, -1 on side a.
+    ("weight", np.float64),
 )
-MOTOR_SIDE = np.dtype([("marker", np.int64), ("signal", np.int64), ("sign", np.float64)], align=True)
-LOAD = np.dtype(
-    [
-        ("marker", np.int64),
-        ("fx", np.float64),  # in the ground frame
-        ("fy", np.float64),
-        ("torque", np.float64),
-        # Signals of the time-dependent components, -1 for constant ones.
-        ("x_signal", np.int64),
-        ("y_signal", np.int64),
-        ("torque_signal", np.int64),
-    ],
-    align=True,
+MOTOR_SIDE = _record(("marker", np.int64), ("signal", np.int64), ("sign", np.float64))
+LOAD = _record(
+    ("marker", np.int64),
+    ("fx", np.float64),  # in the ground frame
+    ("fy", np.float64),
+    ("torque", np.float64),
+    # Signals of the time-dependent components, -1 for constant ones.
+    ("x_signal", np.int64),
+    ("y_signal", np.int64),
+    ("torque_signal", np.int64),
 )
 # Fields of elements between two ends, a and b.
 _ENDS = [
@@ -116,50 +109,38 @@ _ENDS = [
     ("bx", np.float64),
     ("by", np.float64),
 ]
-LINE = np.dtype(
-    [
-        *_ENDS,
-        ("stiffness", np.float64),
-        ("length", np.float64),
-        ("damping", np.float64),
-    ],
-    align=True,
+LINE = _record(
+    *_ENDS,
+    ("stiffness", np.float64),
+    ("length", np.float64),
+    ("damping", np.float64),
 )
-AXIS_RECORD = np.dtype(
-    [
-        *_ENDS,
-        ("angle", np.float64),  # angle of the axis relative to the marker that carries it
-        ("row", np.int64),  # constraint row, -1 for the axis of a motor
-        ("weight", np.float64),  # factor of its value in that row
-        ("signal", np.int64),  # signal of the motor, -1 for none
-        ("track", np.int64),  # deflection that a sliding point follows, -1 for none
-        ("between", np.int64),  # 1 if it points from a to b, so that its value is their distance, else 0
-    ],
-    align=True,
+AXIS_RECORD = _record(
+    *_ENDS,
+    ("angle", np.float64),  # angle of the axis relative to the marker that carries it
+    ("row", np.int64),  # constraint row, -1 for the axis of a motor
+    ("weight", np.float64),  # factor of its value in that row
+    ("signal", np.int64),  # signal of the motor, -1 for none
+    ("track", np.int64),  # deflection that a sliding point follows, -1 for none
+    ("between", np.int64),  # 1 if it points from a to b, so that its value is their distance, else 0
 )
-TRACK = np.dtype(
-    [
-        ("first", np.int64),  # first of its breaks
-        ("pieces", np.int64),
-        ("coefficients", np.int64),  # first of its coefficients, ordered by piece, power and flexible coordinate
-    ],
-    align=True,
+TRACK = _record(
+    ("first", np.int64),  # first of its breaks
+    ("pieces", np.int64),
+    ("coefficients", np.int64),  # first of its coefficients, ordered by piece, power and flexible coordinate
 )
-ROW = np.dtype(
-    [
-        ("kind", np.int64),
-        ("signal", np.int64),  # prescribed value in time, -1 for none
-        ("ground", np.float64),  # contribution of points on the ground to Phi, less the rest angle of a spring
-        # Compliance of a spring, angle - rest = compliance * lambda, or of a damper, rate = compliance * lambda; for
-        # friction the inverse of its steepest slope; else zero.
-        ("compliance", np.float64),
-        ("limit", np.float64),  # limit of friction, lambda = limit tanh(rate / (compliance limit))
-        ("unit", np.float64),  # scale of Phi: the size of the mechanism for a length, 1 for an angle
-        ("second", np.int64),  # 1 if it is the second of two rows that hold one point, else 0
-        ("first", np.int64),  # first column of the row in the envelope of the Schur complement
-        ("start", np.int64),  # storage index of that column
-    ],
-    align=True,
+ROW = _record(
+    ("kind", np.int64),
+    ("signal", np.int64),  # prescribed value in time, -1 for none
+    ("ground", np.float64),  # contribution of points on the ground to Phi, less the rest angle of a spring
+    # Compliance of a spring, angle - rest = compliance * lambda, or of a damper, rate = compliance * lambda; for
+    # friction the inverse of its steepest slope; else zero.
+    ("compliance", np.float64),
+    ("limit", np.float64),  # limit of friction, lambda = limit tanh(rate / (compliance limit))
+    ("unit", np.float64),  # scale of Phi: the size of the mechanism for a length, 1 for an angle
+    ("second", np.int64),  # 1 if it is the second of two rows that hold one point, else 0
+    ("first", np.int64),  # first column of the row in the envelope of the Schur complement
+    ("start", np.int64),  # storage index of that column
 )
 
 
@@ -213,30 +194,30 @@ class Signals(NamedTuple):
 class PointScratch(NamedTuple):
     """Additional work arrays, by mass point, of one body of second-order geometry."""
 
-    q: NDArray[np.float64]  # (3 pitch,) Nx u, Ny u and slopes
-    v: NDArray[np.float64]
-    a: NDArray[np.float64]
-    shares: NDArray[np.float64]  # (3 pitch,) force on each
-    axial: NDArray[np.float64]  # (pitch,) axial forces at the Gauss points
-    rows: NDArray[np.float64]  # (2 nf pitch,) ds/du: x and y of all points by coordinate
-    B_q: NDArray[np.float64]  # (stride,) a marker's bending matrix times u
-    B_v: NDArray[np.float64]
+    q: Annotated[Floats, "sums"]  # Nx u, Ny u and slopes
+    v: Annotated[Floats, "sums"]
+    a: Annotated[Floats, "sums"]
+    shares: Annotated[Floats, "sums"]  # force on each
+    axial: Annotated[Floats, "pitch"]  # axial forces at the Gauss points
+    rows: Annotated[Floats, "tangents"]  # ds/du: x and y of all points by coordinate
+    B_q: Annotated[Floats, "stride"]  # a marker's bending matrix times u
+    B_v: Annotated[Floats, "stride"]
 
 
 @by_reference
 class Scratch(NamedTuple):
     """Work arrays for the terms of one body: sums of u, u' and u'' and results computed from them."""
 
-    q: NDArray[np.float64]  # (widest,) sums of u
-    v: NDArray[np.float64]
-    a: NDArray[np.float64]
-    shares: NDArray[np.float64]  # (widest,) force on each sum
-    G2_q: NDArray[np.float64]  # (widest stride,) G2 u
-    G2_v: NDArray[np.float64]
-    I2_q: NDArray[np.float64]
-    lanes: NDArray[np.float64]  # (most lanes,)
-    rigid: NDArray[np.float64]  # (3 + max nf, padded)
-    turn: NDArray[np.float64]  # (2,) cosine and sine of the body's angle
+    q: Annotated[Floats, "width"]  # sums of u
+    v: Annotated[Floats, "width"]
+    a: Annotated[Floats, "width"]
+    shares: Annotated[Floats, "width"]  # force on each sum
+    G2_q: Annotated[Floats, "stride"]  # G2 u
+    G2_v: Annotated[Floats, "stride"]
+    I2_q: Annotated[Floats, "stride"]
+    lanes: Annotated[Floats, "lanes"]
+    rigid: Annotated[Floats, "coordinates"]
+    turn: Annotated[Floats, 2]  # cosine and sine of the body's angle
     points: PointScratch | None  # None for linear geometry
 
 
@@ -244,26 +225,26 @@ class Scratch(NamedTuple):
 class Workspace(NamedTuple):
     """All work arrays of the kernels, made once per run."""
 
-    f: NDArray[np.float64]  # (n,) residual of the equations of motion
-    x: NDArray[np.float64]  # (n,) solution of a linear system
-    rows: NDArray[np.float64]  # (m,) constraint residual
-    mu: NDArray[np.float64]  # (m,) solution for the multipliers
-    q: NDArray[np.float64]
-    v: NDArray[np.float64]
+    f: Annotated[Floats, "n"]  # residual of the equations of motion
+    x: Annotated[Floats, "n"]  # solution of a linear system
+    rows: Annotated[Floats, "m"]  # constraint residual
+    mu: Annotated[Floats, "m"]  # solution for the multipliers
+    q: Annotated[Floats, "n"]
+    v: Annotated[Floats, "n"]
     scratch: Scratch
-    step: NDArray[np.float64]  # (1,) coefficient b of the factor
-    axes: NDArray[np.float64]  # (axes, 4): e, n . d and the place of a sliding point at the last `orient`
-    compliance: NDArray[np.float64]  # (m,) compliance of the rows, of friction at the last `note_friction`
-    frame: NDArray[np.float64]  # (bodies, 12): cos, sin, s, M_phiphi and the factor of the rigid block, at the factor
-    flex: NDArray[np.float64]  # (2, total nf)
+    step: Annotated[Floats, 1]  # coefficient b of the factor
+    axes: Annotated[Floats, "axes", 4]  # e, n . d and the place of a sliding point at the last `orient`
+    compliance: Annotated[Floats, "m"]  # compliance of the rows, of friction at the last `note_friction`
+    frame: Annotated[Floats, "bodies", 12]  # cos, sin, s, M_phiphi and the factor of the rigid block, at the factor
+    flex: Annotated[Floats, 2, "flexible"]
     # By body, coordinate and lane: the Jacobian rows of the body's ports in its frame; these rows times the inverse of
     # the iteration matrix, then the part of a force on the coordinate that is passed to the three rigid coordinates.
-    jac: NDArray[np.float64]
-    response: NDArray[np.float64]
-    blocks: NDArray[np.float64]  # J M^-1 J^T of every body, in its frame
-    schur: NDArray[np.float64]  # envelope of the Schur complement, then its Cholesky factor
-    redundant: NDArray[np.float64]  # (m,) relative pivot up to which a row redundant at the start is dependent, else 0
-    least: NDArray[np.float64]  # (2,) smallest relative pivot of the other rows, and index of its row
+    jac: Annotated[Floats, "lanes"]
+    response: Annotated[Floats, "lanes"]
+    blocks: Annotated[Floats, "blocks"]  # J M^-1 J^T of every body, in its frame
+    schur: Annotated[Floats, "envelope"]  # envelope of the Schur complement, then its Cholesky factor
+    redundant: Annotated[Floats, "m"]  # relative pivot up to which a row redundant at the start is dependent, else 0
+    least: Annotated[Floats, 2]  # smallest relative pivot of the other rows, and index of its row
     # Matrices of bodies with a dense iteration matrix; None if `PackedSystem.bending` is None:
     mass: NDArray[np.float64] | None  # M, (3 + nf)^2 entries per body
     dense: NDArray[np.float64] | None  # Cholesky factor of M + b (K + K_g)
@@ -271,53 +252,46 @@ class Workspace(NamedTuple):
     geometric: NDArray[np.float64] | None  # K_g, nf^2 entries per body
 
 
+def sizes_of(system: PackedSystem) -> dict[str, int]:
+    """Return the number of coordinates n and of constraint rows m."""
+    return {"n": int(np.sum(3 + system.bodies["nf"])), "m": system.rows.size}
+
+
 def make_workspace(system: PackedSystem) -> Workspace:
     """Allocate the workspace of a system."""
-    n = int(sum(3 + body["nf"] for body in system.bodies))
-    m = system.rows.size
-    full = [body for body in system.bodies if body["full"]]
-    dense = int(sum((3 + body["nf"]) ** 2 for body in full))
-    inverse = int(sum((3 + body["nf"]) * padded(3 + body["nf"]) for body in full))
-    lanes = int(sum((3 + body["nf"]) * body["lanes"] for body in system.bodies))
-    envelope = int(sum(i + 1 - row["first"] for i, row in enumerate(system.rows)))
-    compliance = apart(m)
-    compliance[:] = system.rows["compliance"]
-    return Workspace(
-        f=apart(n),
-        x=apart(n),
-        rows=apart(m),
-        mu=apart(m),
-        q=apart(n),
-        v=apart(n),
-        scratch=make_scratch(system),
-        step=apart(1),
-        axes=apart((system.axes.size, 4)),
-        compliance=compliance,
-        frame=apart((system.bodies.size, 12)),
-        flex=apart((2, system.modal.shape[1])),
-        jac=apart(lanes),
-        response=apart(lanes),
-        blocks=apart(int(np.sum(system.bodies["parts"] * system.bodies["lanes"]))),
-        schur=apart(envelope),
-        redundant=apart(m),
-        least=apart(2),
-        mass=None if system.bending is None else apart(dense),
-        dense=None if system.bending is None else apart(dense),
-        inverse=None if system.bending is None else apart(inverse),
-        geometric=None if system.bending is None else apart(system.I2.size),
-    )
+    bodies, rows, width = system.bodies, system.rows, 3 + system.bodies["nf"]
+    sizes = {
+        **sizes_of(system),
+        "axes": system.axes.size,
+        "bodies": bodies.size,
+        "flexible": system.modal.shape[1],
+        "lanes": int(np.sum(width * bodies["lanes"])),
+        "blocks": int(np.sum(bodies["parts"] * bodies["lanes"])),
+        "envelope": int(np.sum(1 + np.arange(rows.size) - rows["first"])),
+    }
+    full = width[bodies["full"] > 0]
+    dense = {
+        "mass": np.sum(full**2),
+        "dense": np.sum(full**2),
+        "inverse": sum(size * padded(int(size)) for size in full),
+    }
+    matrices = {
+        name: None if system.bending is None else apart(int(size))
+        for name, size in {**dense, "geometric": system.I2.size}.items()
+    }
+    work = allocated(Workspace, sizes, scratch=make_scratch(system), **matrices)
+    work.compliance[:] = rows["compliance"]
+    return work
 
 
 def make_scratch(system: PackedSystem) -> Scratch:
     """Allocate the work arrays for the terms of one body."""
-    width, stride, lanes = (int(system.bodies[name].max(initial=0)) for name in ("width", "stride", "lanes"))
+    names = ("nf", "width", "stride", "lanes", "pitch")
+    nf, width, stride, lanes, pitch = (int(system.bodies[name].max(initial=0)) for name in names)
+    sizes = {"width": width, "stride": stride, "lanes": lanes, "coordinates": padded(3 + nf)}
     points = None
     if system.bending is not None:
-        pitch = int(system.bodies["pitch"].max(initial=0))
-        q, v, a, shares = (apart(3 * pitch) for _ in range(4))
-        rows = apart(2 * pitch * int(system.bodies["nf"].max(initial=0)))
-        points = PointScratch(q, v, a, shares, apart(pitch), rows, apart(stride), apart(stride))
-    q, v, a, shares = (apart(width) for _ in range(4))
-    G2_q, G2_v, I2_q = (apart(stride) for _ in range(3))
-    rigid = apart(padded(3 + int(system.bodies["nf"].max(initial=0))))
-    return Scratch(q, v, a, shares, G2_q, G2_v, I2_q, apart(lanes), rigid, apart(2), points)
+        points = allocated(
+            PointScratch, {"sums": 3 * pitch, "pitch": pitch, "tangents": 2 * pitch * nf, "stride": stride}
+        )
+    return allocated(Scratch, sizes, points=points)

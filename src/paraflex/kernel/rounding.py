@@ -2,29 +2,18 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
-from paraflex.kernel.arrays import add, apart, copy, largest
+from paraflex.kernel import indices as at, samples
+from paraflex.kernel.arrays import Floats, Ints, add, copy, largest
 from paraflex.kernel.bending import note_all_axial_forces
 from paraflex.kernel.bodies import stored_energy, weight_work
 from paraflex.kernel.compiling import by_reference, inlined, kernel, releases_lock, routine
 from paraflex.kernel.constraints import note_friction
 from paraflex.kernel.factor import factor_bodies
 from paraflex.kernel.krylov import exact_correction
-from paraflex.kernel.linear import orient, right_hand_side, solve_system
+from paraflex.kernel.linear import orient, solve_residuals
 from paraflex.kernel.packed import INDEX_1
-from paraflex.kernel.run_state import SAMPLE, WORK
-from paraflex.kernel.samples import (
-    explicit_parts,
-    is_long,
-    place_samples,
-    power_along_curve,
-    step_work,
-    write_energies,
-)
 from paraflex.kernel.stage import equations, note_torques, place
 from paraflex.kernel.step import baumgarte_gains, input_power, stage_start
 from paraflex.kernel.tangent import note_slopes
@@ -45,23 +34,16 @@ class History(NamedTuple):
     Accelerations and multipliers are guesses until `solve_steps_to_rounding` has solved the steps.
     """
 
-    t: NDArray[np.float64]  # (steps,) start times
-    h: NDArray[np.float64]  # (steps,) step sizes
-    restart: NDArray[np.int64]  # (steps,) whether the first stage is solved again
-    q: NDArray[np.float64]  # (steps, stages, n)
-    v: NDArray[np.float64]
-    a: NDArray[np.float64]
-    lam: NDArray[np.float64]  # (steps, stages, m)
-    power: NDArray[np.float64]  # (steps, stages)
-    left: NDArray[np.float64]  # (steps,) largest last relative correction
-    least: NDArray[np.float64]  # (2,) negligible sizes of accelerations and multipliers, or of their derivatives
-
-
-def make_history(steps: int, stages: int, n: int, m: int) -> History:
-    """Allocate a history for a number of steps."""
-    q, v, a = (apart((steps, stages, n)) for _ in range(3))
-    lam, power, restart = apart((steps, stages, m)), apart((steps, stages)), apart(steps, np.int64)
-    return History(apart(steps), apart(steps), restart, q, v, a, lam, power, apart(steps), apart(2))
+    t: Annotated[Floats, "steps"]  # start times
+    h: Annotated[Floats, "steps"]  # step sizes
+    restart: Annotated[Ints, "steps"]  # whether the first stage is solved again
+    q: Annotated[Floats, "steps", "stages", "n"]
+    v: Annotated[Floats, "steps", "stages", "n"]
+    a: Annotated[Floats, "steps", "stages", "n"]
+    lam: Annotated[Floats, "steps", "stages", "m"]
+    power: Annotated[Floats, "steps", "stages"]
+    left: Annotated[Floats, "steps"]  # largest last relative correction
+    least: Annotated[Floats, 2]  # negligible sizes of accelerations and multipliers, or of their derivatives
 
 
 @routine
@@ -132,8 +114,7 @@ def solve_to_rounding(system, signals, t, g, b, weights, dependent_part, march, 
         if exact:
             note_slopes(system, work.q, work.v, work.mu, work.compliance, direction)
         equations(system, signals, t, weights, work.q, work.v, a, lam, march.torques, work)
-        right_hand_side(system, work, scale)
-        solve_system(system, work, work.x, work.mu)
+        solve_residuals(system, work, scale)
         if exact:
             unit = multiplier_unit(least)
             exact_correction(system, g, b, weights, work.q, work.v, a, lam, march.torques, unit, direction, space, work)
@@ -172,13 +153,13 @@ def solve_steps_to_rounding(system, signals, tableau, controls, count, history, 
             march.power[0] = input_power(system, signals, t, march.q, march.v, march.stage_lam[0], march.torques, work)
         copy(march.q, march.stage_q[0])
         copy(march.v, march.stage_v[0])
-        if march.counts[SAMPLE] == 0 and out.times[0] <= t:
+        if march.counts[at.SAMPLE] == 0 and out.times[0] <= t:
             copy(march.q, out.q[0])
             copy(march.v, out.v[0])
             copy(march.stage_a[1, 0], out.a[0])
             copy(march.stage_lam[0], out.lam[0])
             out.energy[0, 2] = weight_work(system, march.q, work.scratch)
-            march.counts[SAMPLE] = 1
+            march.counts[at.SAMPLE] = 1
         weights = baumgarte_weights(controls, controls.alpha, controls.beta, h)
         for i in range(1, last + 1):
             time, g, b = stage_start(tableau, i, t, h, march)
@@ -192,19 +173,19 @@ def solve_steps_to_rounding(system, signals, tableau, controls, count, history, 
             copy(work.q, march.stage_q[i])
             copy(work.v, march.stage_v[i])
             march.power[i] = input_power(system, signals, time, work.q, work.v, march.stage_lam[i], march.torques, work)
-        long = is_long(system, tableau, controls, h)
+        long = samples.is_long(system, tableau, controls, h)
         if long:
-            power_along_curve(system, signals, tableau, t, h, march, work)
+            samples.power_along_curve(system, signals, tableau, t, h, march, work)
         for i in range(last + 1):
             copy(march.stage_q[i], history.q[k, i])
             copy(march.stage_v[i], history.v[k, i])
             copy(march.stage_a[1, i], history.a[k, i])
             copy(march.stage_lam[i], history.lam[k, i])
             history.power[k, i] = march.power[i]
-        first, g = place_samples(tableau, t, h, long, march, out), tableau.A[last, last] * h
-        for i in range(first, march.counts[SAMPLE]):
+        first, g = samples.place_samples(tableau, t, h, long, march, out), tableau.A[last, last] * h
+        for i in range(first, march.counts[at.SAMPLE]):
             if out.solved[i]:
-                explicit_parts(out.q[i], out.v[i], out.a[i], g, g * g, march)
+                samples.explicit_parts(out.q[i], out.v[i], out.a[i], g, g * g, march)
                 note_torques(signals, out.times[i], march.torques)
                 left = solve_to_rounding(
                     system, signals, out.times[i], g, g * g, weights, controls.dependent_part, march, out.a[i],
@@ -213,8 +194,8 @@ def solve_steps_to_rounding(system, signals, tableau, controls, count, history, 
                 history.left[k] = max(history.left[k], left)
                 copy(work.q, out.q[i])
                 copy(work.v, out.v[i])
-        write_energies(system, tableau, t, h, first, march, work, out)
-        march.clock[WORK] += step_work(tableau, h, march)
+        samples.write_energies(system, tableau, t, h, first, march, work, out)
+        march.clock[at.WORK] += samples.step_work(tableau, h, march)
         copy(march.stage_q[last], march.q)
         copy(march.stage_v[last], march.v)
         copy(march.stage_a[1, last], march.stage_a[1, 0])

@@ -10,16 +10,15 @@ or a compiled function computes w from the errors and updates x. Torques g of sa
 from __future__ import annotations
 
 from math import cos, inf, isfinite, sin
-from typing import Any, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 from llvmlite import ir
 from numba import types
 from numba.core import cgutils
 from numba.extending import intrinsic
-from numpy.typing import NDArray
 
-from paraflex.kernel.arrays import copy, fill
+from paraflex.kernel.arrays import Floats, Ints, allocated, copy, fill
 from paraflex.kernel.compiling import by_reference, routine
 
 # Indices of SampledLaw.counts: number of the next sample, number of the next torques to act, whole periods of delay,
@@ -38,56 +37,65 @@ NOT_FINITE, RAISED = 1, 2
 class SampledLaw(NamedTuple):
     """Controller, its state, and its records; without a controller all arrays are empty."""
 
-    clock: NDArray[np.float64]
-    counts: NDArray[np.int64]
-    angle: NDArray[np.int64]  # (inputs,) index of an angle in each reading, see `control.loop.readings.Affine`
-    value: NDArray[np.float64]  # (inputs,)
-    rows_q: NDArray[np.float64]  # (inputs, n)
-    rows_v: NDArray[np.float64]
-    rows_a: NDArray[np.float64]
-    turning: NDArray[np.float64]
-    points: NDArray[np.int64]  # (places, 5) reading, indices of r, angle and u, size of u: see `Place`
-    shapes: NDArray[np.float64]  # (places, numbers) e, x0, N and B
-    resolution: NDArray[np.float64]  # (inputs,) zero without quantisation
-    filter_A: NDArray[np.float64]  # (filters, filters) matrix of all filters together
-    filter_B: NDArray[np.float64]  # (filters, inputs)
-    filter_C: NDArray[np.float64]  # (inputs, filters)
-    filter_D: NDArray[np.float64]  # (inputs,)
-    filter_start: NDArray[np.float64]  # (filters, inputs) steady state of the filters for the first readings
-    reference: NDArray[np.float64]  # (samples, inputs)
-    A: NDArray[np.float64]  # (states, states)
-    B: NDArray[np.float64]  # (states, inputs)
-    C: NDArray[np.float64]  # (outputs, states)
-    D: NDArray[np.float64]  # (outputs, inputs)
-    E: NDArray[np.float64]  # (states, outputs)
-    holding: NDArray[np.float64]  # (outputs,) h
-    first: NDArray[np.float64]  # (states, inputs) initial states for the first errors
-    waiting: NDArray[np.float64]  # (states,) one for states that are held while a torque is limited
-    projector: NDArray[np.float64]  # (samples, outputs, outputs), or none
-    lowest: NDArray[np.float64]  # (outputs,)
-    highest: NDArray[np.float64]
-    most: NDArray[np.float64]  # (outputs,) largest change from sample to sample
-    outputs: NDArray[np.int64]  # (outputs,) number of each motor
-    base: NDArray[np.float64]  # (breaks,) first coefficients of the signals without the controller's torques
-    filtered: NDArray[np.float64]  # (filters,) states of filters
-    x: NDArray[np.float64]  # (states,)
-    last: NDArray[np.float64]  # (outputs,) torques of the last sample
-    held: NDArray[np.float64]  # (motors,) torques that act
-    scratch: NDArray[np.float64]  # (2, most of filters, states, inputs and outputs)
-    t: NDArray[np.float64]  # (samples,) sample times
-    acted: NDArray[np.float64]  # (samples,) times from which on the torques of each sample act
-    readings: NDArray[np.float64]  # (samples, inputs)
-    wanted: NDArray[np.float64]  # (samples, outputs) torques before the limits
-    given: NDArray[np.float64]  # (samples, outputs) torques after the limits
+    clock: Annotated[Floats, "numbers"]  # see START
+    counts: Annotated[Ints, "numbers"]  # see SAMPLED
+    angle: Annotated[Ints, "inputs"]  # index of an angle in each reading, see `control.loop.readings.Affine`
+    value: Annotated[Floats, "inputs"]
+    rows_q: Annotated[Floats, "inputs", "n"]
+    rows_v: Annotated[Floats, "inputs", "n"]
+    rows_a: Annotated[Floats, "inputs", "n"]
+    turning: Annotated[Floats, "inputs", "n"]
+    points: Annotated[Ints, "places", 5]  # reading, indices of r, angle and u, size of u: see `Place`
+    shapes: Annotated[Floats, "places", "numbers"]  # e, x0, N and B
+    resolution: Annotated[Floats, "inputs"]  # zero without quantisation
+    filter_A: Annotated[Floats, "filters", "filters"]  # matrix of all filters together
+    filter_B: Annotated[Floats, "filters", "inputs"]
+    filter_C: Annotated[Floats, "inputs", "filters"]
+    filter_D: Annotated[Floats, "inputs"]
+    filter_start: Annotated[Floats, "filters", "inputs"]  # steady state of the filters for the first readings
+    reference: Annotated[Floats, "samples", "inputs"]
+    A: Annotated[Floats, "states", "states"]
+    B: Annotated[Floats, "states", "inputs"]
+    C: Annotated[Floats, "outputs", "states"]
+    D: Annotated[Floats, "outputs", "inputs"]
+    E: Annotated[Floats, "states", "outputs"]
+    holding: Annotated[Floats, "outputs"]  # h
+    first: Annotated[Floats, "states", "inputs"]  # initial states for the first errors
+    waiting: Annotated[Floats, "states"]  # one for states that are held while a torque is limited
+    projector: Annotated[Floats, "samples", "outputs", "outputs"]  # empty without one
+    lowest: Annotated[Floats, "outputs"]
+    highest: Annotated[Floats, "outputs"]
+    most: Annotated[Floats, "outputs"]  # largest change from sample to sample
+    outputs: Annotated[Ints, "outputs"]  # number of each motor
+    base: Annotated[Floats, "breaks"]  # first coefficients of the signals without the controller's torques
+    filtered: Annotated[Floats, "filters"]  # states of filters
+    x: Annotated[Floats, "states"]
+    last: Annotated[Floats, "outputs"]  # torques of the last sample
+    held: Annotated[Floats, "motors"]  # torques that act
+    scratch: Annotated[Floats, 2, "widest"]  # for filters, states, inputs and outputs
+    t: Annotated[Floats, "samples"]  # sample times
+    acted: Annotated[Floats, "samples"]  # times from which on the torques of each sample act
+    readings: Annotated[Floats, "samples", "inputs"]
+    wanted: Annotated[Floats, "samples", "outputs"]  # torques before the limits
+    given: Annotated[Floats, "samples", "outputs"]  # torques after the limits
 
 
 def no_law() -> SampledLaw:
     """Return an empty law, for a run without a controller."""
-    none, rows, whole = np.zeros(0), np.zeros((0, 0)), np.zeros(0, np.int64)
-    readings = (whole, none, rows, rows, rows, rows, np.zeros((0, 5), np.int64), rows, none)
-    filters, law = (rows, rows, rows, none, rows), (rows, rows, rows, rows, rows, none, rows, none, np.zeros((0, 0, 0)))
-    state, done = (none, none, none, none, rows), (none, none, rows, rows, rows)
-    return SampledLaw(none, whole, *readings, *filters, rows, *law, none, none, none, whole, none, *state, *done)
+    names = (
+        "numbers",
+        "inputs",
+        "n",
+        "places",
+        "filters",
+        "samples",
+        "states",
+        "outputs",
+        "breaks",
+        "motors",
+        "widest",
+    )
+    return allocated(SampledLaw, dict.fromkeys(names, 0))
 
 
 def _function_called(typingctx, address, k, t, y, x, torques):

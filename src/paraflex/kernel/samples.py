@@ -6,28 +6,17 @@ from math import isfinite
 
 import numpy as np
 
+from paraflex.kernel import indices as at
 from paraflex.kernel.arrays import add, copy, fill, largest
 from paraflex.kernel.bending import note_all_axial_forces
 from paraflex.kernel.bodies import stored_energy
 from paraflex.kernel.compiling import inlined, routine
 from paraflex.kernel.constraints import note_friction
 from paraflex.kernel.factor import factor_bodies
-from paraflex.kernel.linear import SINGULAR_PART, orient, right_hand_side, solve_system
+from paraflex.kernel.linear import SINGULAR_PART, orient, solve_residuals
 from paraflex.kernel.metric import mass_norm
 from paraflex.kernel.packed import INDEX_1
-from paraflex.kernel.run_state import (
-    BAUMGARTE,
-    CONTRACTION,
-    NEAR,
-    PEAK,
-    SAMPLE,
-    SAMPLE_CHANGE,
-    STAGE_B,
-    STAGE_G,
-    TRIED,
-    WEIGHT_0,
-    WORK,
-)
+from paraflex.kernel.run_state import BAUMGARTE
 from paraflex.kernel.stage import ROUNDING, WORST_CONTRACTION, largest_part, note_torques, place, residuals
 from paraflex.kernel.step import constraint_weights, input_power
 
@@ -70,7 +59,7 @@ def place_samples(tableau, t, h, long, march, out):
     not accurate: positions are then interpolated through all stages, and velocities are the derivative of that
     polynomial.
     """
-    piece, first = 0, march.counts[SAMPLE]
+    piece, first = 0, march.counts[at.SAMPLE]
     i = first
     while i < out.times.size and out.times[i] <= t + h * (1.0 + 1e-12):
         time = out.times[i]
@@ -89,7 +78,7 @@ def place_samples(tableau, t, h, long, march, out):
             interpolate_nodes(tableau, (time - t) / h, march.stage_q, out.q[i])
             differentiate_nodes(tableau, (time - t) / h, h, march.stage_q, out.v[i])
         i += 1
-    march.counts[SAMPLE] = i
+    march.counts[at.SAMPLE] = i
     return first
 
 
@@ -106,18 +95,18 @@ def solve_samples(system, signals, controls, t, h, first, march, work, out, asid
     Each sample is solved with the factor of the step, or with a factor made at the sample if that fails. Near a
     singular position, where rows of the step's factor are held, the factor is made at once.
     """
-    near, g, b = march.counts[NEAR] > 0, march.clock[STAGE_G], march.clock[STAGE_B]
+    near, g, b = march.counts[at.NEAR] > 0, march.clock[at.STAGE_G], march.clock[at.STAGE_B]
     weights = INDEX_1
     if controls.treatment == BAUMGARTE:
-        weights = constraint_weights(controls, march.clock[TRIED])[0]
-    for i in range(first, march.counts[SAMPLE]):
-        needed = near or out.stored[i] or (h >= controls.long_from and march.clock[SAMPLE_CHANGE] > FORCES_BETWEEN)
+        weights = constraint_weights(controls, march.clock[at.TRIED])[0]
+    for i in range(first, march.counts[at.SAMPLE]):
+        needed = near or out.stored[i] or (h >= controls.long_from and march.clock[at.SAMPLE_CHANGE] > FORCES_BETWEEN)
         if needed and out.times[i] < t + h * (1.0 - SAME_TIME):
             explicit_parts(out.q[i], out.v[i], out.a[i], g, b, march)
             copy(out.a[i], march.eq)
             copy(out.lam[i], march.guess_lam)
             solved = not near and solve_at(
-                system, signals, out.times[i], weights, g, b, march.clock[CONTRACTION], march, work, out.a[i],
+                system, signals, out.times[i], weights, g, b, march.clock[at.CONTRACTION], march, work, out.a[i],
                 out.lam[i], march.torques,
             )  # fmt: skip
             if not solved:
@@ -129,7 +118,7 @@ def solve_samples(system, signals, controls, t, h, first, march, work, out, asid
 def solve_anew(system, signals, controls, i, weights, march, work, out, aside):
     """Solve a sample with a factor made there; return whether the iteration succeeds."""
     q, v, a, lam = out.q[i], out.v[i], out.a[i], out.lam[i]
-    g, b = march.clock[STAGE_G], march.clock[STAGE_B]
+    g, b = march.clock[at.STAGE_G], march.clock[at.STAGE_B]
     copy(march.eq, a)
     copy(march.guess_lam, lam)
     copy(work.redundant, aside.redundant)
@@ -148,14 +137,14 @@ def end_sample(system, i, solved, march, work, out):
     q, v, a, lam = out.q[i], out.v[i], out.a[i], out.lam[i]
     for r in range(lam.size):
         work.mu[r] = lam[r] - march.guess_lam[r] if solved else 0.0
-    known = system.modal.shape[1] == 0 and largest(march.forces[PEAK]) > 0.0
-    march.clock[SAMPLE_CHANGE] = largest_part(work.mu, march.forces[PEAK]) if known else 1.0
-    if not solved or march.clock[SAMPLE_CHANGE] <= NO_CHANGE:
+    known = system.modal.shape[1] == 0 and largest(march.forces[at.PEAK]) > 0.0
+    march.clock[at.SAMPLE_CHANGE] = largest_part(work.mu, march.forces[at.PEAK]) if known else 1.0
+    if not solved or march.clock[at.SAMPLE_CHANGE] <= NO_CHANGE:
         copy(march.eq, a)
         copy(march.guess_lam, lam)
         solved = False
     for j in range(q.size):
-        q[j], v[j] = march.qs[j] + march.clock[STAGE_B] * a[j], march.vs[j] + march.clock[STAGE_G] * a[j]
+        q[j], v[j] = march.qs[j] + march.clock[at.STAGE_B] * a[j], march.vs[j] + march.clock[at.STAGE_G] * a[j]
     return solved
 
 
@@ -175,8 +164,7 @@ def solve_at(system, signals, t, weights, g, b, contraction, march, work, a, lam
     for _ in range(MOST):
         place(march.qs, march.vs, g, b, a, march.shift[:0], work)
         residuals(system, signals, t, weights, work.q, work.v, a, lam, torques, work)
-        right_hand_side(system, work, scale)
-        solve_system(system, work, work.x, work.mu)
+        solve_residuals(system, work, scale)
         add(work.x, a)
         add(work.mu, lam)
         # Accelerations times the mass are the forces of the equations of motion.
@@ -197,14 +185,14 @@ def solve_at(system, signals, t, weights, g, b, contraction, march, work, a, lam
 @routine
 def write_energies(system, tableau, t, h, first, march, work, out):
     """Compute energies and work at the samples of the step from `first` on."""
-    for i in range(first, march.counts[SAMPLE]):
+    for i in range(first, march.counts[at.SAMPLE]):
         kinetic, strain, weight = stored_energy(system, out.q[i], out.v[i], out.lam[i], work.scratch)
         out.energy[i, 0], out.energy[i, 1] = kinetic, strain
-        out.energy[i, 2] = march.clock[WORK]
+        out.energy[i, 2] = march.clock[at.WORK]
         done = min(max((out.times[i] - t) / h, 0.0), 1.0)
         for s in range(march.power.size):
             out.energy[i, 2] += h * work_weight(tableau, s, done)[0] * march.power[s]
-        out.energy[i, 2] += weight - march.clock[WEIGHT_0]
+        out.energy[i, 2] += weight - march.clock[at.WEIGHT_0]
 
 
 @routine

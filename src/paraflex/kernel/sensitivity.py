@@ -16,21 +16,13 @@ from __future__ import annotations
 
 import numpy as np
 
+from paraflex.kernel import rounding
 from paraflex.kernel.arrays import add, apart, copy, fill
 from paraflex.kernel.compiling import releases_lock, routine
 from paraflex.kernel.constraints import note_friction
 from paraflex.kernel.krylov import exact_correction
-from paraflex.kernel.linear import right_hand_side, solve_system
+from paraflex.kernel.linear import solve_residuals
 from paraflex.kernel.packed import Signals
-from paraflex.kernel.rounding import (
-    MOST_CORRECTIONS,
-    MOST_EXACT,
-    baumgarte_weights,
-    ended,
-    multiplier_unit,
-    prepare_matrix,
-    relative,
-)
 from paraflex.kernel.samples import is_long
 from paraflex.kernel.sensitivity_samples import (
     DIFFERENCE_STEP,
@@ -76,7 +68,7 @@ def find_parametric(moved, signals, controls, t, d_t, length, d_length, q, v, a,
     for e in OUTSIDE_IN:
         step, share = PLACES[e] * DIFFERENCE_STEP, WEIGHTS[e] / DIFFERENCE_STEP
         alpha, beta = sensitivity.gains[e, 0], sensitivity.gains[e, 1]
-        weights = baumgarte_weights(controls, alpha, beta, length + step * d_length)
+        weights = rounding.baumgarte_weights(controls, alpha, beta, length + step * d_length)
         equations(moved[e], signals[e], t + step * d_t, weights, q, v, a, lam, torques, work)
         for j in range(sensitivity.f.size):
             sensitivity.f[j] += share * work.f[j]
@@ -95,11 +87,11 @@ def respond_to_parameter(
     """
     scale = 1.0 / (weights[0] + weights[1] * g + weights[2] * b)
     da, dlam = sensitivity.a[i], sensitivity.lam[i]
-    prepare_matrix(system, b, q, v, a, lam, dependent_part, work)
+    rounding.prepare_matrix(system, b, q, v, a, lam, dependent_part, work)
     note_slopes(system, q, v, work.mu, work.compliance, direction)
     change, previous = 0.0, 0.0
-    for iteration in range(MOST_CORRECTIONS + MOST_EXACT):
-        if iteration == MOST_CORRECTIONS:
+    for iteration in range(rounding.MOST_CORRECTIONS + rounding.MOST_EXACT):
+        if iteration == rounding.MOST_CORRECTIONS:
             fill(da, 0.0)
             fill(dlam, 0.0)
         for j in range(da.size):
@@ -112,16 +104,15 @@ def respond_to_parameter(
             work.f[j] = direction.f[j] + sensitivity.f[j]
         for r in range(dlam.size):
             work.rows[r] = direction.rows[r] + sensitivity.rows[r]
-        right_hand_side(system, work, scale)
-        solve_system(system, work, work.x, work.mu)
-        if iteration >= MOST_CORRECTIONS:
+        solve_residuals(system, work, scale)
+        if iteration >= rounding.MOST_CORRECTIONS:
             exact_correction(
-                system, g, b, weights, q, v, a, lam, torques, multiplier_unit(least), direction, space, work
+                system, g, b, weights, q, v, a, lam, torques, rounding.multiplier_unit(least), direction, space, work
             )
         add(work.x, da)
         add(work.mu, dlam)
-        change = relative(work.x, work.mu, da, dlam, least[0], least[1])
-        if ended(change, previous, iteration):
+        change = rounding.relative(work.x, work.mu, da, dlam, least[0], least[1])
+        if rounding.ended(change, previous, iteration):
             break
         previous = change
     for j in range(da.size):
@@ -159,7 +150,7 @@ def stage_sensitivity(
     take_pieces(signals, t, moved_signals, pieces)
     find_parametric(moved, pieces, controls, t, d_t, length, d_length, q, v, a, lam, torques, sensitivity, work)
     note_torques(signals, t, torques)
-    here = baumgarte_weights(controls, controls.alpha, controls.beta, length)
+    here = rounding.baumgarte_weights(controls, controls.alpha, controls.beta, length)
     return respond_to_parameter(
         system, g, g * g, here, controls.dependent_part, q, v, a, lam, least, i, torques, sensitivity, direction, space,
         work,

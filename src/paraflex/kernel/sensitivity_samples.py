@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from paraflex.kernel.arrays import apart, fill
+from paraflex.kernel.arrays import Floats, Ints, fill
 from paraflex.kernel.compiling import by_reference, inlined, routine
 from paraflex.kernel.samples import differentiate_nodes, interpolate, node_slope, node_value, work_weight
 
@@ -20,61 +20,29 @@ PLACES, WEIGHTS = (-2.0, -1.0, 1.0, 2.0), (1.0 / 12.0, -8.0 / 12.0, 8.0 / 12.0, 
 class Sensitivity(NamedTuple):
     """Derivatives of the motion by one parameter: derivatives of the inputs, of the state, and of the samples."""
 
-    t: NDArray[np.float64]  # (steps,) derivatives of the start times of steps
-    h: NDArray[np.float64]  # (steps,) derivatives of the step sizes
-    gains: NDArray[np.float64]  # (4, 2) Baumgarte's alpha and beta at the points of the difference
-    q: NDArray[np.float64]  # (stages + 1, n) at the stages of the current step, the first its start, and at a sample
-    v: NDArray[np.float64]
-    a: NDArray[np.float64]
-    lam: NDArray[np.float64]  # (stages + 1, m)
-    power: NDArray[np.float64]  # (stages,)
-    f: NDArray[np.float64]  # (n,) R_s of the equations of motion
-    rows: NDArray[np.float64]  # (m,) R_s of the constraint rows
-    moved_q: NDArray[np.float64]  # scratch
-    moved_v: NDArray[np.float64]
-    moved_lam: NDArray[np.float64]
-    work: NDArray[np.float64]  # (2,) work so far and its derivative
-    taken: NDArray[np.int64]  # (1,) number of samples so far
-    left: NDArray[np.float64]  # (steps,) largest last relative correction, as in `History`
+    t: Annotated[Floats, "steps"]  # derivatives of the start times of steps
+    h: Annotated[Floats, "steps"]  # derivatives of the step sizes
+    gains: Annotated[Floats, 4, 2]  # Baumgarte's alpha and beta at the points of the difference
+    q: Annotated[Floats, "states", "n"]  # at the stages of the current step, the first its start, and at a sample
+    v: Annotated[Floats, "states", "n"]
+    a: Annotated[Floats, "states", "n"]
+    lam: Annotated[Floats, "states", "m"]
+    power: Annotated[Floats, "stages"]
+    f: Annotated[Floats, "n"]  # R_s of the equations of motion
+    rows: Annotated[Floats, "m"]  # R_s of the constraint rows
+    moved_q: Annotated[Floats, "n"]  # scratch
+    moved_v: Annotated[Floats, "n"]
+    moved_lam: Annotated[Floats, "m"]
+    work: Annotated[Floats, 2]  # work so far and its derivative
+    taken: Annotated[Ints, 1]  # number of samples so far
+    left: Annotated[Floats, "steps"]  # largest last relative correction, as in `History`
     times: NDArray[np.float64]  # (times,) sample times
     sample_times: NDArray[np.float64]  # (times,) derivatives of the sample times
-    sample_q: NDArray[np.float64]  # (times, n)
-    sample_v: NDArray[np.float64]
-    sample_a: NDArray[np.float64]
-    sample_lam: NDArray[np.float64]  # (times, m)
-    sample_work: NDArray[np.float64]  # (times,) without the work of weight
-
-
-def make_sensitivity(
-    steps: int, stages: int, n: int, m: int, times: NDArray[np.float64], sample_times: NDArray[np.float64]
-) -> Sensitivity:
-    """Allocate the derivatives by one parameter, set to zero."""
-    k = times.size
-    return Sensitivity(
-        t=apart(steps),
-        h=apart(steps),
-        gains=apart((4, 2)),
-        q=apart((stages + 1, n)),
-        v=apart((stages + 1, n)),
-        a=apart((stages + 1, n)),
-        lam=apart((stages + 1, m)),
-        power=apart(stages),
-        f=apart(n),
-        rows=apart(m),
-        moved_q=apart(n),
-        moved_v=apart(n),
-        moved_lam=apart(m),
-        work=apart(2),
-        taken=apart(1, np.int64),
-        left=apart(steps),
-        times=times,
-        sample_times=sample_times,
-        sample_q=apart((k, n)),
-        sample_v=apart((k, n)),
-        sample_a=apart((k, n)),
-        sample_lam=apart((k, m)),
-        sample_work=apart(k),
-    )
+    sample_q: Annotated[Floats, "times", "n"]
+    sample_v: Annotated[Floats, "times", "n"]
+    sample_a: Annotated[Floats, "times", "n"]
+    sample_lam: Annotated[Floats, "times", "m"]
+    sample_work: Annotated[Floats, "times"]  # without the work of weight
 
 
 @routine

@@ -2,20 +2,14 @@
 
 from __future__ import annotations
 
+from paraflex.kernel.arrays import last_before
 from paraflex.kernel.compiling import inlined, kernel
 
 
 @inlined
 def piece_at(s, k, t):
     """Return the piece of signal k with breaks[piece] <= t, by bisection; the first or last piece outside the range."""
-    low, high = s.start[k], s.start[k + 1] - 2
-    while low < high:
-        middle = (low + high + 1) // 2
-        if s.breaks[middle] <= t:
-            low = middle
-        else:
-            high = middle - 1
-    return low
+    return last_before(s.breaks, s.start[k], s.start[k + 1] - 2, t)
 
 
 @kernel

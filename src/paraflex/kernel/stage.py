@@ -16,22 +16,14 @@ from __future__ import annotations
 
 from math import isfinite
 
+from paraflex.kernel import joints
 from paraflex.kernel.arrays import add, largest
 from paraflex.kernel.axes import apply_axes
 from paraflex.kernel.bodies import begin_body
 from paraflex.kernel.compiling import inlined, routine, unoptimised
 from paraflex.kernel.constraints import constraint_values
 from paraflex.kernel.factor import factor_bodies
-from paraflex.kernel.joints import (
-    add_joints,
-    add_motors,
-    apply_lines,
-    apply_loads,
-    finish_friction,
-    start_compliant_rows,
-    start_rows,
-)
-from paraflex.kernel.linear import SINGULAR_PART, orient, right_hand_side, solve_system
+from paraflex.kernel.linear import SINGULAR_PART, orient, right_hand_side, solve_residuals, solve_system
 from paraflex.kernel.metric import mass_norm
 from paraflex.kernel.near import hold_rows
 from paraflex.kernel.projection import least_change
@@ -67,6 +59,17 @@ def equations(system, signals, t, weights, q, v, a, lam, torques, work):
 
 
 @inlined
+def solve_linear(system, signals, t, weights, q, v, a, lam, torques, work):
+    """Solve for accelerations and multipliers at (t, q, v), in which the equations are linear, with their factor."""
+    # The second pass only removes rounding.
+    for _ in range(2):
+        equations(system, signals, t, weights, q, v, a, lam, torques, work)
+        solve_residuals(system, work, 1.0)
+        add(work.x, a)
+        add(work.mu, lam)
+
+
+@inlined
 def note_torques(signals, t, torques):
     """Evaluate the motor torques, and the time-dependent components of loads, at a time."""
     for k in range(torques.size):
@@ -76,17 +79,17 @@ def note_torques(signals, t, torques):
 @routine
 def residuals(system, signals, t, weights, q, v, a, lam, torques, work):
     """Compute the residuals of `equations` with given torques."""
-    start_rows(system, signals, t, weights, work.rows)
-    start_compliant_rows(system, lam, work.rows)
+    joints.start_rows(system, signals, t, weights, work.rows)
+    joints.start_compliant_rows(system, lam, work.rows)
     for i in range(system.bodies.size):
         begin_body(system, i, q, v, a, work.f, work.scratch, work.scratch.points)
-        add_joints(system, i, q, v, a, lam, weights, work.scratch, work.f, work.rows)
-        add_motors(system, i, torques, work.scratch, work.f)
+        joints.add_joints(system, i, q, v, a, lam, weights, work.scratch, work.f, work.rows)
+        joints.add_motors(system, i, torques, work.scratch, work.f)
         hand_on(system, i, work.scratch, work.f)
     apply_axes(system, q, v, a, lam, weights, torques, work.f, work.rows)
-    finish_friction(system, lam, work.compliance, work.rows)
-    apply_loads(system, q, torques, work.f)
-    apply_lines(system, q, v, work.f)
+    joints.finish_friction(system, lam, work.compliance, work.rows)
+    joints.apply_loads(system, q, torques, work.f)
+    joints.apply_lines(system, q, v, work.f)
 
 
 @routine

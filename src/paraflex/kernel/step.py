@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from math import isfinite
 
+from paraflex.kernel import indices as at, near
 from paraflex.kernel.arrays import copy, fill, largest
 from paraflex.kernel.axes import axis_power
 from paraflex.kernel.bending import note_all_axial_forces
@@ -25,46 +26,9 @@ from paraflex.kernel.error import (
 from paraflex.kernel.factor import factor_bodies
 from paraflex.kernel.joints import line_energy, load_power, marker_angle, modal_damping_power
 from paraflex.kernel.linear import SINGULAR_PART, orient
-from paraflex.kernel.near import (
-    NEAR_PART,
-    begin_near,
-    comes_near,
-    elastic_measure_changes,
-    note_passage,
-    note_position,
-    note_root,
-    return_to_constraints,
-    share_of_passage,
-    trust,
-)
 from paraflex.kernel.newmark import newmark_end, newmark_start
 from paraflex.kernel.packed import INDEX_1
-from paraflex.kernel.run_state import (
-    CONTRACTION,
-    CYCLE,
-    ENTERS,
-    EXCESS,
-    FACTOR_B,
-    FACTORS,
-    FRESH,
-    GGL,
-    HELD_END,
-    IMPATIENT,
-    ITERATIONS,
-    NEAR,
-    NO_CONVERGENCE,
-    NOT_FINITE,
-    PART_END,
-    PAUSED,
-    PEAK,
-    POSITION,
-    PREPARED,
-    PROJECTION,
-    REUSED,
-    STAGE_B,
-    STAGE_G,
-    WIDEST,
-)
+from paraflex.kernel.run_state import ENTERS, GGL, NO_CONVERGENCE, NOT_FINITE, PAUSED, POSITION, PROJECTION
 from paraflex.kernel.signals import evaluate_signal
 from paraflex.kernel.stage import CONVERGED, SINGULAR, SLOW, WORST_CONTRACTION, place, solve_stage
 
@@ -134,8 +98,8 @@ def renew_factor(system, b, march, work):
     """Factor the bodies for stages with this b at the current deformation."""
     note_all_axial_forces(system, march.q, march.v, march.stage_a[1, 0], march.stage_lam[0], work, work.geometric)
     factor_bodies(system, b, march.q, work)
-    march.counts[FACTORS] += 1
-    march.clock[FACTOR_B], march.clock[CONTRACTION] = b, WORST_CONTRACTION
+    march.counts[at.FACTORS] += 1
+    march.clock[at.FACTOR_B], march.clock[at.CONTRACTION] = b, WORST_CONTRACTION
 
 
 @routine
@@ -146,18 +110,20 @@ def note_excess(system, iterations, fresh, march):
     """
     cost = FACTOR_COST if system.bending is None else BENT_FACTOR_COST
     if fresh:
-        march.counts[FRESH] = min(iterations, march.counts[FRESH] + 1) if march.counts[FRESH] > 0 else iterations
-        march.counts[EXCESS], march.counts[REUSED] = 0, 0
-        march.counts[IMPATIENT] = max(0, march.counts[IMPATIENT] - 1)
-        if march.counts[IMPATIENT] > 0:
-            march.clock[FACTOR_B] = -1.0
+        march.counts[at.FRESH] = (
+            min(iterations, march.counts[at.FRESH] + 1) if march.counts[at.FRESH] > 0 else iterations
+        )
+        march.counts[at.EXCESS], march.counts[at.REUSED] = 0, 0
+        march.counts[at.IMPATIENT] = max(0, march.counts[at.IMPATIENT] - 1)
+        if march.counts[at.IMPATIENT] > 0:
+            march.clock[at.FACTOR_B] = -1.0
         return
-    march.counts[REUSED] += 1
-    march.counts[EXCESS] += max(0, iterations - march.counts[FRESH])
-    if march.counts[EXCESS] >= cost:
-        march.clock[FACTOR_B] = -1.0
-        if march.counts[REUSED] == 1 and march.counts[EXCESS] > cost:
-            march.counts[IMPATIENT] = IMPATIENCE
+    march.counts[at.REUSED] += 1
+    march.counts[at.EXCESS] += max(0, iterations - march.counts[at.FRESH])
+    if march.counts[at.EXCESS] >= cost:
+        march.clock[at.FACTOR_B] = -1.0
+        if march.counts[at.REUSED] == 1 and march.counts[at.EXCESS] > cost:
+            march.counts[at.IMPATIENT] = IMPATIENCE
 
 
 @routine
@@ -216,63 +182,63 @@ def attempt(system, signals, tableau, controls, t, h, march, work, slow):
     x, g, b = t, tableau.A[1, 1] * h, (tableau.A[1, 1] * h) ** 2
     if one_stage:
         x, g, b = newmark_start(tableau.newmark, t, h, march)
-    fresh = march.clock[FACTOR_B] != b
+    fresh = march.clock[at.FACTOR_B] != b
     if fresh:
-        if elastic_measure_changes(system, b, march):
+        if near.elastic_measure_changes(system, b, march):
             # The rate of change of the root is computed from matrices with the same b, that of the last step.
             orient(system, march.q, work, controls.dependent_part)
-            note_root(system, march, work)
+            near.note_root(system, march, work)
         renew_factor(system, b, march, work)
     rubs = note_friction(system, march.q, march.v, work.mu, work.compliance)
     orient(system, march.q, work, controls.dependent_part)
     at_singular = work.least[0] < SINGULAR_PART
-    note_root(system, march, work)
-    perhaps_near = work.least[0] < NEAR_PART * march.clock[WIDEST] and march.counts[PREPARED] >= 0
-    march.counts[NEAR], march.counts[HELD_END] = 0, 0
-    if perhaps_near and comes_near(h, march):
-        if march.counts[PREPARED] == 0:
+    near.note_root(system, march, work)
+    perhaps_near = work.least[0] < near.NEAR_PART * march.clock[at.WIDEST] and march.counts[at.PREPARED] >= 0
+    march.counts[at.NEAR], march.counts[at.HELD_END] = 0, 0
+    if perhaps_near and near.comes_near(h, march):
+        if march.counts[at.PREPARED] == 0:
             return ENTERS, 0.0
-        begin_near(system, march, work)
-    allowed = controls.tolerance * h / march.clock[CYCLE]
-    newton_tolerance, newton_memory = controls.newton_fraction * allowed, NEWTON_MEMORY * march.clock[CYCLE]
-    force, force_tolerance = largest(march.forces[PEAK]), 0.0
+        near.begin_near(system, march, work)
+    allowed = controls.tolerance * h / march.clock[at.CYCLE]
+    newton_tolerance, newton_memory = controls.newton_fraction * allowed, NEWTON_MEMORY * march.clock[at.CYCLE]
+    force, force_tolerance = largest(march.forces[at.PEAK]), 0.0
     if controls.force_part > 0.0 and force > 0.0:
         force_tolerance = FORCE_FRACTION * allowed_part(controls, h, march)
         newton_tolerance = min(
             newton_tolerance, force_tolerance * force / system.total_mass * max(b, g * newton_memory)
         )
-    before = march.counts[ITERATIONS]
+    before = march.counts[at.ITERATIONS]
     i, rounds, held = 1, 0, 0.0
     while i < stages:
         if not one_stage:
             x, g, b = stage_start(tableau, i, t, h, march)
         march.stage_t[1, i] = t + tableau.c[i] * h
-        held, lag = trust(weights, g, b, x - t, march)
+        held, lag = near.trust(weights, g, b, x - t, march)
         if rounds == 0:
             predict(i, x, h, march)
             copy(march.stage_lam[i - 1], march.stage_lam[i])
             fill(march.shift, 0.0)
         status, iterations, contraction = solve_stage(
             system, signals, x, g, b, weights, march.qs, march.vs, march.stage_a[1, i], march.stage_lam[i], march.shift,
-            march.torques, newton_tolerance, newton_memory, march.clock[CONTRACTION],
-            controls.dependent_part, march.counts[NEAR] > 0, held, lag, march.forces[PEAK], force_tolerance, work,
+            march.torques, newton_tolerance, newton_memory, march.clock[at.CONTRACTION],
+            controls.dependent_part, march.counts[at.NEAR] > 0, held, lag, march.forces[at.PEAK], force_tolerance, work,
         )  # fmt: skip
-        march.counts[ITERATIONS] += iterations
-        march.clock[CONTRACTION] = contraction
+        march.counts[at.ITERATIONS] += iterations
+        march.clock[at.CONTRACTION] = contraction
         if status == SINGULAR:
             if at_singular:
-                note_passage(t, h, march)
-                march.counts[NEAR], perhaps_near, rounds = 0, False, 0
+                near.note_passage(t, h, march)
+                march.counts[at.NEAR], perhaps_near, rounds = 0, False, 0
                 continue
-            note_position(march.stage_t[1, i], t, h, march)
+            near.note_position(march.stage_t[1, i], t, h, march)
             # The constraints do not determine the accelerations here, so they are extrapolated.
             predict(i, x, h, march)
             place(march.qs, march.vs, g, b, march.stage_a[1, i], march.shift, work)
         elif status != CONVERGED:
-            if fresh and perhaps_near and march.counts[NEAR] == 0 and not at_singular:
-                if march.counts[PREPARED] == 0:
+            if fresh and perhaps_near and march.counts[at.NEAR] == 0 and not at_singular:
+                if march.counts[at.PREPARED] == 0:
                     return ENTERS, 0.0
-                begin_near(system, march, work)
+                near.begin_near(system, march, work)
                 rounds = 0
                 continue
             can_continue = rubs or (status == SLOW and controls.fixed_step > 0.0)
@@ -289,7 +255,7 @@ def attempt(system, signals, tableau, controls, t, h, march, work, slow):
             continue
         rounds = 0
         if one_stage:
-            varying = controls.fixed_step == 0.0 or t < march.clock[PART_END]
+            varying = controls.fixed_step == 0.0 or t < march.clock[at.PART_END]
             newmark_end(system, signals, tableau.newmark, varying, t, h, march, work)
         copy(work.q, march.stage_q[i])
         copy(work.v, march.stage_v[i])
@@ -300,12 +266,12 @@ def attempt(system, signals, tableau, controls, t, h, march, work, slow):
             system, signals, march.stage_t[1, i], work.q, work.v, march.stage_lam[i], march.torques, work
         )
         i += 1
-    march.clock[STAGE_G], march.clock[STAGE_B] = g, b
-    note_excess(system, march.counts[ITERATIONS] - before, fresh, march)
+    march.clock[at.STAGE_G], march.clock[at.STAGE_B] = g, b
+    note_excess(system, march.counts[at.ITERATIONS] - before, fresh, march)
     moved = 0.0
-    if march.counts[NEAR] > 0:
-        march.clock[FACTOR_B] = -1.0
-        moved = return_to_constraints(system, signals, t + h, held, march, work) / controls.near_error
+    if march.counts[at.NEAR] > 0:
+        march.clock[at.FACTOR_B] = -1.0
+        moved = near.return_to_constraints(system, signals, t + h, held, march, work) / controls.near_error
     error = 0.0
     if controls.fixed_step == 0.0:
         if tableau.error.size > 0:
@@ -313,8 +279,8 @@ def attempt(system, signals, tableau, controls, t, h, march, work, slow):
         else:
             history_error(h, march)
         error_q, error_v = filtered_error(system, b**0.5, gains, march, work, slow)
-        if march.counts[NEAR] > 0:
-            allowed = max(allowed, controls.near_error * share_of_passage(h, march))
+        if march.counts[at.NEAR] > 0:
+            allowed = max(allowed, controls.near_error * near.share_of_passage(h, march))
         note_lost_vibrations(system, controls, h, b**0.5, march, work)
         error = max(max(error_q, error_v) / allowed, moved, force_error(controls, h, march))
     if not isfinite(error):

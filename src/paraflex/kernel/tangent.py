@@ -9,16 +9,16 @@ direction.
 from __future__ import annotations
 
 from math import cosh, sqrt
-from typing import NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from paraflex.kernel.arrays import fill
+from paraflex.kernel.arrays import Floats, allocated, apart, fill
 from paraflex.kernel.compiling import by_reference, inlined, kernel, routine
 from paraflex.kernel.constraints import joint_rates
 from paraflex.kernel.joints import apply_torque, end_motion, load_at, marker_angles, marker_motion, row_part
-from paraflex.kernel.packed import ANGLE, AXIS, CONSTRAINT, FRICTION, PackedSystem
+from paraflex.kernel.packed import ANGLE, AXIS, CONSTRAINT, FRICTION, PackedSystem, sizes_of
 from paraflex.kernel.tangent_axes import axes_tangent
 from paraflex.kernel.tangent_bodies import body_terms_tangent
 from paraflex.kernel.tangent_points import end_tangent, force_tangent, marker_tangent
@@ -28,22 +28,20 @@ from paraflex.kernel.tangent_points import end_tangent, force_tangent, marker_ta
 class Tangent(NamedTuple):
     """Direction, and the changes along it."""
 
-    q: NDArray[np.float64]  # (n,) direction
-    v: NDArray[np.float64]
-    a: NDArray[np.float64]
-    lam: NDArray[np.float64]  # (m,)
-    f: NDArray[np.float64]  # (n,) change of the residual of the equations of motion
-    rows: NDArray[np.float64]  # (m,) change of the residual of the rows
-    friction: NDArray[np.float64]  # (m,) slope of the rows of friction against the rate, at the last `note_slopes`
+    q: Annotated[Floats, "n"]  # direction
+    v: Annotated[Floats, "n"]
+    a: Annotated[Floats, "n"]
+    lam: Annotated[Floats, "m"]
+    f: Annotated[Floats, "n"]  # change of the residual of the equations of motion
+    rows: Annotated[Floats, "m"]  # change of the residual of the rows
+    friction: Annotated[Floats, "m"]  # slope of the rows of friction against the rate, at the last `note_slopes`
     points: NDArray[np.float64] | None  # (8, max mass points of a body) scratch of second-order geometry
 
 
 def make_tangent(system: PackedSystem) -> Tangent:
     """Allocate a direction, set to zero, and the changes along it."""
-    n, m = int(sum(3 + body["nf"] for body in system.bodies)), system.rows.size
-    points = None if system.bending is None else np.zeros((8, int(system.bodies["points"].max(initial=0))))
-    q, v, a, f = (np.zeros(n) for _ in range(4))
-    return Tangent(q, v, a, np.zeros(m), f, np.zeros(m), np.zeros(m), points)
+    points = None if system.bending is None else apart((8, int(system.bodies["points"].max(initial=0))))
+    return allocated(Tangent, sizes_of(system), points=points)
 
 
 @inlined

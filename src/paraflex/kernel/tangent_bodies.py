@@ -198,9 +198,7 @@ def body_terms_tangent(system, i, q, v, a, direction, points):
 
     `points` is direction.points, None for linear geometry.
     """
-    if points is None:
-        body_tangent(system, i, q, v, a, direction)
-    elif system.bodies[i].slopes > 0:
+    if points is not None and system.bodies[i].slopes > 0:
         second_order_tangent(system, i, q, v, a, direction, points)
     else:
         body_tangent(system, i, q, v, a, direction)

@@ -13,21 +13,20 @@ from paraflex.kernel.packed import NX, NY
 def shortening_tangent(system, bending, marker, q, v, a, direction):
     """Return the changes of the results of `joints.marker_shortening`."""
     f0, f1, f2 = 0.0, 0.0, 0.0
-    if bending is None:
+    if bending is None or marker.bending < 0:
         return f0, f1, f2
     body = system.bodies[marker.body]
     e, n = body.offset + 3, body.nf
-    if marker.bending >= 0:
-        for j in range(n):
-            row = marker.bending + j * body.stride
-            bq, b_dq, b_dv = 0.0, 0.0, 0.0
-            for l in range(n):
-                bq += bending[row + l] * q[e + l]
-                b_dq += bending[row + l] * direction.q[e + l]
-                b_dv += bending[row + l] * direction.v[e + l]
-            f0 += q[e + j] * b_dq
-            f1 += direction.v[e + j] * bq + v[e + j] * b_dq
-            f2 += direction.a[e + j] * bq + a[e + j] * b_dq + 2.0 * v[e + j] * b_dv
+    for j in range(n):
+        row = marker.bending + j * body.stride
+        bq, b_dq, b_dv = 0.0, 0.0, 0.0
+        for l in range(n):
+            bq += bending[row + l] * q[e + l]
+            b_dq += bending[row + l] * direction.q[e + l]
+            b_dv += bending[row + l] * direction.v[e + l]
+        f0 += q[e + j] * b_dq
+        f1 += direction.v[e + j] * bq + v[e + j] * b_dq
+        f2 += direction.a[e + j] * bq + a[e + j] * b_dq + 2.0 * v[e + j] * b_dv
     return f0, f1, f2
 
 
@@ -90,9 +89,7 @@ def force_tangent(system, marker, q, force, d_force, lever, d_lever, direction):
 @inlined
 def shorten_tangent(system, bending, marker, q, force, d_force, direction):
     """Subtract from direction.f the change of a force along the beam times the derivative of a marker's f/2."""
-    if bending is None:
-        return
-    if marker.bending < 0:
+    if bending is None or marker.bending < 0:
         return
     body = system.bodies[marker.body]
     e, n = body.offset + 3, body.nf
