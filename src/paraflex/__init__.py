@@ -3,8 +3,6 @@
 Each public name is imported at its first use; `__init__.pyi` lists all public names in groups.
 """
 
-from __future__ import annotations
-
 import warnings
 from importlib import import_module
 from pathlib import Path

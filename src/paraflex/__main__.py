@@ -1,7 +1,5 @@
 """Entry point of the command line, as `python -m paraflex` and as `paraflex`."""
 
-from __future__ import annotations
-
 import os
 import sys
 from contextlib import suppress

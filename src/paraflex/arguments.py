@@ -5,8 +5,6 @@ Errors name the argument or field. The expected types come from the annotations 
 names are checked where the values are used.
 """
 
-from __future__ import annotations
-
 import collections.abc as abc
 import sys
 import typing

@@ -1,11 +1,9 @@
 """Types of numeric arrays for annotations; the docstrings give the shapes."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike as ArrayLike, NDArray as NDArray
 
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]

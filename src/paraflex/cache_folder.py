@@ -4,8 +4,6 @@ Numba tries the folder of the sources and the user's cache folder, or only NUMBA
 write to none of them, kernels cannot be imported: a read-only installation, run by a user without a home folder.
 """
 
-from __future__ import annotations
-
 import os
 import sys
 from collections.abc import MutableMapping

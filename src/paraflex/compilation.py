@@ -3,8 +3,6 @@
 Numba would compile each kernel at its first call, one after the other; here two processes compile in parallel.
 """
 
-from __future__ import annotations
-
 import gc
 import hashlib
 import logging

@@ -4,8 +4,6 @@ The view of a mechanism or a run needs drawings and metrics, which import the cl
 therefore registered by class with `late.view` in higher layers.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Container, Iterable, Sequence
 from html import escape

@@ -14,8 +14,6 @@ Winfrey (1971), J. Eng. Ind. 93, 268-272; Erdman, Sandor and Oakberg (1972), J. 
 and Frohrib (1978), Mech. Mach. Theory 13, 603-618; Turcic and Midha (1984), J. Dyn. Syst. Meas. Control 106, 243-248.
 """
 
-from __future__ import annotations
-
 import math
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
@@ -181,7 +179,7 @@ class _NominalMotion:
     v: Array
     a: Array
 
-    def __getitem__(self, instants: slice) -> _NominalMotion:
+    def __getitem__(self, instants: slice) -> "_NominalMotion":
         return _NominalMotion(self.system, *(part[instants] for part in (self.t, self.q, self.v, self.a)))
 
     @property

@@ -5,8 +5,6 @@ remedy, and the command line prints it as one line and exits with code 2. A `Num
 remedy, and carries the results computed until the failure.
 """
 
-from __future__ import annotations
-
 import os
 import re
 import sys
@@ -67,19 +65,19 @@ class InputError(ParaflexError, ValueError):
         remedy = f"; {self.remedy}" if self.remedy else ""
         return printable(f"{where}: {self.problem}{value}{remedy}").replace("\n", "\\n")
 
-    def in_file(self, source: str) -> InputError:
+    def in_file(self, source: str) -> "InputError":
         """Return the same error with the name of its file."""
         return type(self)(self.problem, field=self.field, value=self.value, remedy=self.remedy, source=source)
 
-    def at(self, field: str) -> InputError:
+    def at(self, field: str) -> "InputError":
         """Return the same error under another option or field, without a file."""
         return type(self)(self.problem, field=field, value=self.value, remedy=self.remedy)
 
-    def advising(self, remedy: str) -> InputError:
+    def advising(self, remedy: str) -> "InputError":
         """Return the same error with another remedy."""
         return type(self)(self.problem, field=self.field, value=self.value, remedy=remedy, source=self.source)
 
-    def within(self, table: str) -> InputError:
+    def within(self, table: str) -> "InputError":
         """Return the same error with its field inside a table."""
         field = f"{table}.{self.field}"
         return type(self)(self.problem, field=field, value=self.value, remedy=self.remedy, source=self.source)
@@ -132,7 +130,7 @@ def as_enum(kind: type[E], value: E | str, field: str) -> E:
         raise InputError(f"unknown {what}", field=field, value=value, remedy=remedy) from None
 
 
-def warn_user(warning: ParaflexWarning) -> None:
+def warn_user(warning: "ParaflexWarning") -> None:
     """Issue a warning that points to the calling line outside of this package.
 
     The number of calls in between depends on decorators and code paths, so a constant `stacklevel` cannot be used.

@@ -3,8 +3,6 @@
 `CODES` lists the codes; the documentation page "Findings" is generated from this table.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from enum import Enum
@@ -174,7 +172,7 @@ class Finding:
         return {"code": self.code, "level": self.level.value, **texts}
 
     @classmethod
-    def from_dict(cls, kept: Mapping[str, str]) -> Finding:
+    def from_dict(cls, kept: Mapping[str, str]) -> "Finding":
         """Return the finding from a dictionary made by `to_dict`."""
         return cls(kept["code"], kept["place"], kept["text"], kept["remedy"])
 

@@ -3,16 +3,14 @@
 `number` writes plain ASCII, for terminals and files; `typeset` turns such a text into that of pages and figures.
 """
 
-from __future__ import annotations
-
 import math
 import re
 import sys
 from collections.abc import Iterable
 
 import numpy as np
-from numpy.typing import ArrayLike
 
+from paraflex.arrays import ArrayLike
 from paraflex.units import STRESS, DisplayUnit
 
 # Text for a value that does not exist.

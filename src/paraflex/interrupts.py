@@ -4,8 +4,6 @@ The signals are Ctrl-C, SIGTERM, and SIGHUP from a closing terminal. Their handl
 command line in `cli/signals.py`.
 """
 
-from __future__ import annotations
-
 import multiprocessing
 import os
 import signal

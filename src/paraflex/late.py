@@ -3,8 +3,6 @@
 `paraflex/__init__.py`, which knows all layers, lists the modules that register them.
 """
 
-from __future__ import annotations
-
 from functools import singledispatch
 from importlib import import_module
 from typing import Any

@@ -3,8 +3,6 @@
 Input beyond a limit is refused with an error before time or memory is spent on it.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 from contextlib import contextmanager

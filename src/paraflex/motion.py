@@ -1,7 +1,5 @@
 """Runs of a mechanism without a path, under loads, prescribed motions and given motor torques."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property

@@ -6,8 +6,6 @@ Programs that rewrite such a file, or change it with the libraries of these form
 read unchecked, like files of earlier releases.
 """
 
-from __future__ import annotations
-
 import hashlib
 from pathlib import Path
 from typing import BinaryIO

@@ -1,7 +1,5 @@
 """Study of the paper (Fig. 10): desired path, rigid joint motion, torques of a mode, run of the flexible mechanism."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from enum import Enum
@@ -98,7 +96,7 @@ class TrackingTask:
     effort: Effort
     plan: TorquePlan
     start: State
-    whole: TrackingTask | None = None
+    whole: "TrackingTask | None" = None
     after: Ending = Ending.FREE
 
     def __post_init__(self) -> None:
@@ -148,7 +146,7 @@ class TrackingTask:
         )
 
     @checked_arguments()
-    def remodelled(self, mechanism: Mechanism) -> TrackingTask:
+    def remodelled(self, mechanism: Mechanism) -> "TrackingTask":
         """Return the task, motion and torques unchanged, for another model of the bodies: rigid, other mesh, geometry.
 
         Parameters
@@ -160,7 +158,7 @@ class TrackingTask:
         return replace(self, mechanism=mechanism, system=system, start=_start(system, self.motion))
 
     @checked_arguments()
-    def in_segments(self, segments: int | Mapping[str, int] = 8) -> TrackingTask:
+    def in_segments(self, segments: int | Mapping[str, int] = 8) -> "TrackingTask":
         """Return the task for the virtual prototype of finite segments, driven by the same torques.
 
         Parameters
@@ -178,7 +176,7 @@ class TrackingTask:
         return replace(self.remodelled(finite_segments(self.mechanism, segments).mechanism), whole=self)
 
     @checked_arguments()
-    def balanced(self, mode: str | ActuationMode) -> TrackingTask:
+    def balanced(self, mode: str | ActuationMode) -> "TrackingTask":
         """Return the task with a balanced start, at the path's initial position and velocity of a mode's motors.
 
         Under weight or loads links sag before they move; started undeformed, they would vibrate about that deflection.
@@ -203,7 +201,7 @@ class TrackingTask:
         options: IntegrationOptions | None = None,
         after: Ending | str | None = None,
         warning: bool = True,
-    ) -> TrackingRun:
+    ) -> "TrackingRun":
         """Drive the flexible mechanism with the torques of a mode: see the function `simulate`."""
         return simulate(self, mode, method=method, options=options, after=after, warning=warning)
 

@@ -1,7 +1,5 @@
 """Units of quantities: factors to SI units, dimensions, and parsing of quantities such as "80 mm" within a text."""
 
-from __future__ import annotations
-
 import math
 import re
 from difflib import get_close_matches
@@ -38,7 +36,7 @@ class Unit(NamedTuple):
     pi: int
     dimension: Dimension
 
-    def times(self, other: Unit, power: int) -> Unit:
+    def times(self, other: "Unit", power: int) -> "Unit":
         """Return the product with a power of another unit."""
         dimension = tuple(one + power * two for one, two in zip(self.dimension, other.dimension, strict=True))
         return Unit(self.factor * other.factor**power, self.pi + power * other.pi, dimension)  # type: ignore[arg-type]

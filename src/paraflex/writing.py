@@ -4,8 +4,6 @@ A file has another name until it is complete. After an error or Ctrl-C, the prev
 file is left beside it.
 """
 
-from __future__ import annotations
-
 import hashlib
 import json
 import os

@@ -5,8 +5,6 @@ Q, where Q = Z^T (M a + h) is the required effort and B = Z^T S_motor the actuat
 active motors that do, those of least Euclidean norm are chosen.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

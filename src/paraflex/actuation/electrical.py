@@ -1,7 +1,5 @@
 """Currents and voltages of motors in a run, from the parameters of their actuators."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any

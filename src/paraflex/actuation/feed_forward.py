@@ -1,7 +1,5 @@
 """Torques as smooth functions of time: splines between the path's knots, exact to the tolerance."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
@@ -60,7 +58,7 @@ class FeedForward:
             columns.append(sum(signal.coefficients[piece, power] * x**power for power in range(_DEGREE + 1)))
         return np.column_stack(columns)
 
-    def shaped(self, delays: Array, weights: Array) -> FeedForward:
+    def shaped(self, delays: Array, weights: Array) -> "FeedForward":
         """Return the weighted sum of delayed copies of these torques; before the first instant its torque holds.
 
         Parameters

@@ -1,7 +1,5 @@
 """Journal of runs: an SQLite file of rows, each with its own digest, written by one process at a time."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 import shutil
@@ -64,7 +62,7 @@ class _Tally:
     count: int = 0
     total: int = 0
 
-    def plus(self, digest: str, sign: int = 1) -> _Tally:
+    def plus(self, digest: str, sign: int = 1) -> "_Tally":
         return _Tally(self.count + sign, (self.total + sign * int(digest, 16)) % (1 << 128))
 
 

@@ -1,7 +1,5 @@
 """Base classes of studies and their results, and the progress of a study."""
 
-from __future__ import annotations
-
 import shutil
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator
@@ -81,7 +79,7 @@ class Workers(CheckedFields):
     cluster: str | None = None
 
     @classmethod
-    def of(cls, given: Workers | int | None) -> Workers:
+    def of(cls, given: "Workers | int | None") -> "Workers":
         """Return the given workers, or that number of threads."""
         return given if isinstance(given, Workers) else cls(number=given)
 

@@ -3,8 +3,6 @@
 All of them run any function of a task, and the results do not depend on the kind of workers.
 """
 
-from __future__ import annotations
-
 import logging
 import math
 import multiprocessing
@@ -64,7 +62,7 @@ class Engine:
     def __init__(self, workers: int) -> None:
         self._workers = workers
 
-    def __enter__(self) -> Engine:
+    def __enter__(self) -> "Engine":
         return self
 
     def __exit__(self, kind: type[BaseException] | None, *_: object) -> None:

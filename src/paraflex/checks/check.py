@@ -1,7 +1,5 @@
 """All checks of a model together, with those of its start without a path and of unused entries of its file."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path as FilePath

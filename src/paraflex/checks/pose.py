@@ -1,7 +1,5 @@
 """Checks of the pose a mechanism starts from: closure, special poses, freedoms, vibrations, loose points."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Checks of a model's study: whether it can run along its path and in its modes, and whether anything is cut off."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """`paraflex run` along paths: each path in every requested mode, with a results folder of its own."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager

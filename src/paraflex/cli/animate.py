@@ -1,7 +1,5 @@
 """`paraflex animate`: a film, or pictures, of a run."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Entry point of the `paraflex` command."""
 
-from __future__ import annotations
-
 import errno
 import gc
 import io

@@ -1,7 +1,5 @@
 """Progress bars on stderr; they are removed at the end if stderr is not a terminal."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from typing import Any

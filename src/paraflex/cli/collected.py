@@ -1,7 +1,5 @@
 """Collected warnings of a command: each is printed once, when the command ends or before its numbers."""
 
-from __future__ import annotations
-
 import warnings
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager

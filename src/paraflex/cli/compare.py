@@ -1,7 +1,5 @@
 """`paraflex compare`: two runs side by side."""
 
-from __future__ import annotations
-
 import time
 from pathlib import Path
 

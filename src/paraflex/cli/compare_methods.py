@@ -1,7 +1,5 @@
 """`paraflex compare-methods`: time, work and error of every integration method on one motion."""
 
-from __future__ import annotations
-
 import time
 from typing import Any
 

@@ -1,7 +1,5 @@
 """`paraflex control compare`: comparison of control laws in several actuation modes."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Iterator
 

@@ -1,7 +1,5 @@
 """`paraflex new` and `paraflex schema`: a model file to start from, and the schema for editors to check it."""
 
-from __future__ import annotations
-
 import json
 import re
 from pathlib import Path

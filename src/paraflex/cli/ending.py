@@ -1,7 +1,5 @@
 """Results of a command: printed, and written with figures and a report; and its exit code."""
 
-from __future__ import annotations
-
 import json
 import time
 from collections.abc import Callable, Iterable, Mapping

@@ -1,7 +1,5 @@
 """`paraflex export`: results in the formats of other programs."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from paraflex.cli.commands.requests import flagged

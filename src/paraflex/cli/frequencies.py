@@ -1,12 +1,10 @@
 """Natural frequencies that `paraflex info` prints, and the pose that they refer to."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from paraflex.arrays import Array
 from paraflex.checks import BALANCED
 from paraflex.cli.commands.models import InfoRequest
 from paraflex.cli.request import check_time
@@ -84,6 +82,6 @@ def _growing(vibration: Vibration) -> int:
     return int(np.sum(vibration.squares < 0.0))
 
 
-def hertz(omega: NDArray[np.float64]) -> list[float]:
+def hertz(omega: Array) -> list[float]:
     """Convert angular frequencies [rad/s] to frequencies [Hz]."""
     return [float(w) / (2.0 * np.pi) for w in omega]

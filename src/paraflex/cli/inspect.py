@@ -1,7 +1,5 @@
 """`paraflex info`: facts on a mechanism and whether it is sound; without a name, the contents of the library."""
 
-from __future__ import annotations
-
 import json
 import math
 from contextlib import suppress

@@ -1,7 +1,5 @@
 """Tables that `paraflex info` prints."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 

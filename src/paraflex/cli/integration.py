@@ -1,7 +1,5 @@
 """Settings of a run from options or the model's [study]: method, steps, constraints, number of coordinates."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import asdict
 from typing import Any

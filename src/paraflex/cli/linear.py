@@ -1,7 +1,5 @@
 """`paraflex linearise` and `paraflex reduce`: linear models in the actuation modes, in full and with few states."""
 
-from __future__ import annotations
-
 import numpy as np
 import xarray as xr
 

@@ -1,7 +1,5 @@
 """Linear models requested by commands: of a model at rest or in motion, or of the runs of stored results."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple

@@ -1,7 +1,5 @@
 """`paraflex methods`: list of the integration methods and their parameters."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Iterable, Sequence
 from dataclasses import asdict

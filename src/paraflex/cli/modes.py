@@ -1,7 +1,5 @@
 """`paraflex modes`: actuation modes of a mechanism, and how well each can drive it along a path."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Iterable
 from dataclasses import replace

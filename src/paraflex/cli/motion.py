@@ -1,7 +1,5 @@
 """`paraflex run` of a mechanism without a path, under its loads, prescribed angles and given torques."""
 
-from __future__ import annotations
-
 import time
 import warnings
 from collections.abc import Sequence

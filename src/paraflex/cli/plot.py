@@ -1,7 +1,5 @@
 """`paraflex plot`: figures of stored results, drawn for print."""
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Repetition of the runs of a results folder from its provenance, as results do not store all data of a run."""
 
-from __future__ import annotations
-
 import json
 import shlex
 from collections.abc import Iterator, Sequence

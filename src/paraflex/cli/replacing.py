@@ -1,7 +1,5 @@
 """Contents of a results folder that a command will replace or leave: reported before the command computes."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager

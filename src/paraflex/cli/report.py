@@ -1,7 +1,5 @@
 """`paraflex report`: the report of stored results."""
 
-from __future__ import annotations
-
 from importlib import import_module
 from pathlib import Path
 

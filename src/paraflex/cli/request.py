@@ -1,7 +1,5 @@
 """Common parts of commands that simulate a study: model, paths, modes, controllers, plan, and errors."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager

@@ -1,7 +1,5 @@
 """`paraflex run`: check of the request, then runs along paths or of the mechanism's own motion."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from contextlib import ExitStack
 from dataclasses import asdict

@@ -1,7 +1,5 @@
 """Tables and lines that `paraflex run` prints on its runs."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 

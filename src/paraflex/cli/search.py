@@ -1,7 +1,5 @@
 """`paraflex optimise` and `paraflex identify`: searches for designs, continued when called again."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from pathlib import Path
 from typing import TypeVar

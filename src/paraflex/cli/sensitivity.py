@@ -1,7 +1,5 @@
 """`paraflex sensitivity`: derivatives of the metrics of runs with respect to numbers of the mechanism's file."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 from paraflex.cli import COMPLETE

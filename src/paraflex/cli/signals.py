@@ -4,8 +4,6 @@ Before its work has begun and after it has ended, the process exits at once. Dur
 KeyboardInterrupt, as Python does for Ctrl-C alone: finished results are kept and reported.
 """
 
-from __future__ import annotations
-
 import os
 import signal
 import sys

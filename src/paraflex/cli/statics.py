@@ -1,7 +1,5 @@
 """`paraflex statics`: static equilibria under loads and travel, applied in steps."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 

@@ -1,7 +1,5 @@
 """Events that end a run, as --stop-at names them, and numbers in options."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from typing import Any

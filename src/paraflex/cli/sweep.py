@@ -1,7 +1,5 @@
 """`paraflex sweep` and `paraflex indices`: thousands of runs with varied numbers, continued when called again."""
 
-from __future__ import annotations
-
 import time
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """`paraflex verify`: comparison of one mechanism at every fidelity and in other engines."""
 
-from __future__ import annotations
-
 import time
 from dataclasses import asdict
 

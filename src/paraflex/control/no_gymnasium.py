@@ -1,7 +1,5 @@
 """Substitute for Gymnasium's base class if that is not installed: modules can be imported, but make no environments."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from paraflex.errors import InputError
@@ -16,7 +14,7 @@ class Env:
         Gymnasium is not installed; raised when an environment is made.
     """
 
-    def __new__(cls, *args: Any, **settings: Any) -> Env:
+    def __new__(cls, *args: Any, **settings: Any) -> "Env":
         """Raise the error that Gymnasium is not installed."""
         raise InputError(
             "environments need Gymnasium, which is not installed", field=cls.__name__,

@@ -1,7 +1,5 @@
 """Observations of an agent: readings, optionally less the planned readings, and a preview of the plan."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 
 import numpy as np

@@ -1,13 +1,11 @@
 """Metrics of runs as columns of a table, and as smooth functions of a perturbed run."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from paraflex.arrays import NDArray
 from paraflex.equilibria.conditions import Conditions
 from paraflex.equilibria.result import Statics
 from paraflex.errors import InputError, IntegrationError, Moment, as_enum, suggestion

@@ -1,7 +1,5 @@
 """Runs of a model without a path: the mechanism moves under loads, prescribed motions and given torques."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 

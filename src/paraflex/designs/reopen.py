@@ -1,7 +1,5 @@
 """Reopening of a study's folder: its parameters and mechanism, and repetition of single runs."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Designs of a sweep: grids, lists, random and Sobol samples of several parameters at once."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass

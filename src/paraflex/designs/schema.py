@@ -1,7 +1,5 @@
 """Pydantic schema of the study file of a sweep, and a function that reads study files."""
 
-from __future__ import annotations
-
 from collections.abc import Collection, Iterator
 from contextlib import contextmanager
 from pathlib import Path

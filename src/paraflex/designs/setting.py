@@ -1,7 +1,5 @@
 """Common settings of all runs of a study: mechanism, parameters, and options of the runs."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 from collections.abc import Mapping

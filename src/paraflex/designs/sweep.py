@@ -1,7 +1,5 @@
 """Sweeps: thousands of runs of a mechanism, one row each, whose results do not depend on workers and restarts."""
 
-from __future__ import annotations
-
 import hashlib
 import time
 from collections.abc import Callable, Iterator, Mapping
@@ -11,10 +9,9 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from paraflex.arguments import checked_arguments, named_in_errors
-from paraflex.arrays import Array
+from paraflex.arrays import Array, Mask
 from paraflex.campaign import (
     TRAJECTORIES,
     Campaign,
@@ -309,7 +306,7 @@ class _Session:
             if 0 <= number < study.runs:  # a foreign folder may have others
                 rows[number // len(self.setting.modes)] += 1
         # A task with a missing row is repeated completely.
-        self.done: NDArray[np.bool_] = rows == len(self.setting.modes)
+        self.done: Mask = rows == len(self.setting.modes)
 
     def _runs(self) -> Iterator[int]:
         """Yield the run numbers of all rows, except of complete runs whose trajectory was removed from the folder."""

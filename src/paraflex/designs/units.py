@@ -1,7 +1,5 @@
 """Units of the parameters of designs, from the descriptions in the schemas of files."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 

@@ -3,8 +3,6 @@
 The interface of a body has the coordinates of its points that joints, motors, springs, loads and lumps act on.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from typing import Any

@@ -1,7 +1,5 @@
 """Brakes: joints locked from an instant on, at the angle or travel they have at that instant."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 

@@ -1,7 +1,5 @@
 """Starts at which branches meet: change points with two possible velocities, and dead centres of drives."""
 
-from __future__ import annotations
-
 from typing import Any, NamedTuple
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Constraints of joints and compliant members as sums of terms, and their order."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple

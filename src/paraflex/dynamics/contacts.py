@@ -13,8 +13,6 @@ for a free frame the moment of the inertia of the beam accelerated by P. dM vani
 Bisplinghoff, Ashley (1962), Principles of Aeroelasticity, 9.2 (mode acceleration: the static response of all modes).
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Coordinates and material points of a body: the only module that maps slices of q to bodies."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 
@@ -129,11 +127,11 @@ class Marker:
     bending: Array | None = None
 
     @property
-    def on_frame(self) -> Marker:
+    def on_frame(self) -> "Marker":
         """Marker at the same position, fixed to the body frame, without the deformation."""
         return replace(self, N=np.zeros_like(self.N), slope=np.zeros_like(self.slope), bending=None)
 
-    def relative_to(self, other: Marker) -> Marker:
+    def relative_to(self, other: "Marker") -> "Marker":
         """Return the marker whose `place` is relative to another point of the body, which bending does not shorten."""
         return replace(self, x0=self.x0 - other.x0, N=self.N - other.N, slope=self.slope - other.slope)
 

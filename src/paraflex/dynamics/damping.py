@@ -22,8 +22,6 @@ with redundant supports. K psi_k is a force, which rigid motion does not change:
 in every frame.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Degrees of freedom that sets of motors drive at a pose."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations

@@ -1,7 +1,5 @@
 """Equilibrium under weight, loads and springs: at rest with some joints held, and in a prescribed motion."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Start of prescribed motions away from an assembly: the pose is moved there by continuation, on its own branch."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 from functools import partial

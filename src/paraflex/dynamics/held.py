@@ -1,7 +1,5 @@
 """Vibrations and static shapes of a body under conditions: rows on its undeformed coordinates (r, phi, u)."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

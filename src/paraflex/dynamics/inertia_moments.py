@@ -15,8 +15,6 @@ Bisplinghoff, Ashley (1962), Principles of Aeroelasticity, 9.2 (mode acceleratio
 of Structural Dynamics, 2nd ed., 11.4.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from paraflex.arrays import Array

@@ -1,7 +1,5 @@
 """Order of the signals: motors first, then loads in time, then prescribed motions."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 from paraflex.mechanism import Mechanism

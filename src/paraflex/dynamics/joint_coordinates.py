@@ -1,7 +1,5 @@
 """Coordinate on which a joint's motor acts: the angle of a revolute joint, the travel of a sliding joint."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import NamedTuple
 

@@ -5,8 +5,6 @@ lambda: -lambda acts on body b. The same holds for the multipliers of prescribed
 and, times the weight of the joint, of gears. A motor's torque or force acts on b with its own sign.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -70,7 +68,7 @@ class JointParts(NamedTuple):
     terms: Sequence[RowTerm]
     motors: Sequence[int]
 
-    def alone(self) -> JointParts:
+    def alone(self) -> "JointParts":
         """Renumber the parts for arrays of this joint's multipliers and motors only, ordered as `rows` and `motors`."""
         place = {row: i for i, row in enumerate(self.rows)}
         terms = [RowTerm([place[row] for row in rows], term) for rows, term in self.terms]

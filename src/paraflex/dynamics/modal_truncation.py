@@ -5,8 +5,6 @@ Their series converges to the rotation of an end under a moment with the first p
 deflection under forces converges with the third. A beam clamped by a weld is too stiff by the same error.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import replace
 from typing import NamedTuple

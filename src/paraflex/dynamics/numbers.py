@@ -1,7 +1,5 @@
 """Conversion of a record of arrays to one vector of its numbers and back, to differentiate by all of them at once."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from typing import Any, TypeVar
 

@@ -1,7 +1,5 @@
 """Records for the kernels from a system's constraints, motors and bodies; names of the rows."""
 
-from __future__ import annotations
-
 from collections import Counter
 from dataclasses import replace
 from typing import Any

@@ -1,7 +1,5 @@
 """Motion of named points, beam tips and deflections from chords, from coordinates over time (k, n)."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

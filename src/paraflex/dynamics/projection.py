@@ -3,8 +3,6 @@
 Every pose of this package except the steps of a run is found here: assemblies, starts, poses near a path.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 

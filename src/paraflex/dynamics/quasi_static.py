@@ -1,7 +1,5 @@
 """Balanced start: static equilibrium if drives are at rest, else the quasi-static deflection in their motion."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from functools import partial

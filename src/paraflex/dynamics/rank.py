@@ -1,7 +1,5 @@
 """Redundant constraint rows: dependences between rows, and multipliers of least norm."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

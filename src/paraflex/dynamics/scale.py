@@ -1,7 +1,5 @@
 """Reference length for the tolerances of a mechanism."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

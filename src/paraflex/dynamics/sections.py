@@ -17,8 +17,6 @@ Cook, Malkus, Plesha, Witt (2002), Concepts and Applications of Finite Element A
 between nodes superposed on the results of nodal displacements).
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -104,7 +102,7 @@ class Sections:
     area: Array
     modulus: Array
     strength: Array
-    parts: tuple[_Beam, ...]
+    parts: "tuple[_Beam, ...]"
 
     def loads(self, system: System, q: Array, v: Array, a: Array, multipliers: Array) -> SectionLoads:
         """Return the loads of sections for coordinates (k, n), their derivatives, and the multipliers (k, m)."""
@@ -146,7 +144,7 @@ class _Beam(NamedTuple):
     moment: Array
     force: Array | None
     resisted: Array | None = None
-    change: _Change | None = None
+    change: "_Change | None" = None
     contacts: Contacts | None = None
 
 

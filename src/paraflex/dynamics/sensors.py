@@ -4,8 +4,6 @@ Every sensor reads from the few bodies, constraint rows and motors that it depen
 its derivatives. Squire, Trapp (1998), Using complex variables to estimate derivatives of real functions.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import cache, partial

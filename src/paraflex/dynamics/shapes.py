@@ -1,7 +1,5 @@
 """Shape integrals and material points of a body of any kind, in its own coordinates."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import NamedTuple

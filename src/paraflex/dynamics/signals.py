@@ -1,7 +1,5 @@
 """Time profiles for the kernels: motor torques, loads and prescribed angles as piecewise quintics."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from itertools import pairwise
 from typing import NamedTuple

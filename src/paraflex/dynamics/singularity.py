@@ -1,7 +1,5 @@
 """Distance of a pose from a singular configuration, of the constraints or of the mechanism with motors held."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cached_property
 

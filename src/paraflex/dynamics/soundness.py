@@ -1,7 +1,5 @@
 """Soundness of a mechanism: closure of its assemblies, degrees of freedom, redundant constraints."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass

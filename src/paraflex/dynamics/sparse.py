@@ -4,8 +4,6 @@ A mechanism of thousands of bodies has a few entries per row. The cost of work a
 frequencies) then grows with the number of entries, not with the square of the number of coordinates.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence
 
 import numpy as np

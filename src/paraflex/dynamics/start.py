@@ -1,7 +1,5 @@
 """States from the start of a motion as given by the user, by names."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from functools import partial
 from typing import NamedTuple

@@ -1,7 +1,5 @@
 """States of a system: poses, consistent positions and velocities, momentum."""
 
-from __future__ import annotations
-
 import heapq
 from collections.abc import Mapping
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Matrices of linear systems with states, inputs and outputs."""
 
-from __future__ import annotations
-
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -19,14 +17,14 @@ class StateSpace(NamedTuple):
     D: Numbers
 
     @classmethod
-    def of(cls, *given: Any) -> StateSpace:
+    def of(cls, *given: Any) -> "StateSpace":
         """Return a model from array-like matrices; an empty A means a model without states."""
         A, B, C, D = (np.atleast_2d(np.asarray(each, dtype=float)) for each in given)
         if not A.size:
             A, B, C = np.zeros((0, 0)), np.zeros((0, D.shape[1])), np.zeros((D.shape[0], 0))
         return cls(A, B, C, D)
 
-    def triangular(self) -> StateSpace:
+    def triangular(self) -> "StateSpace":
         """Return the model in complex states in which A is upper triangular."""
         upper, basis = scipy.linalg.schur(self.A, output="complex")
         return StateSpace(upper, basis.conj().T @ self.B, self.C @ basis, self.D)

@@ -1,7 +1,5 @@
 """Forces at rest and their derivatives by the pose: stiffness of springs, weight, loads and constraint forces."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

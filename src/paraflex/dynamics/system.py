@@ -1,7 +1,5 @@
 """System of a mechanism: everything that does not depend on the coordinates, computed once."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Hashable
 from dataclasses import dataclass, replace
 from functools import cached_property

@@ -1,21 +1,18 @@
 """Motion of rigid bodies and ANCF cables from the coordinates of Exudyn."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from paraflex.arrays import Array
+from paraflex.arrays import Array, Indices
 from paraflex.dynamics.points import PointMotion, cross
 from paraflex.fem import BeamMesh, SpanProperties
 from paraflex.mechanism import Joint, PointRef
 from paraflex.results.outlines import Outline, turned
 
-Columns = NDArray[np.int64]
+Columns = Indices
 
 # Numbers of Gauss points: those of Exudyn for a cable's virtual work, and those for a mass integrand of sixth degree.
 _AXIAL_POINTS, _BENDING_POINTS, _MASS_POINTS = 5, 3, 4
@@ -65,7 +62,7 @@ class Trajectory:
     states: Array
     multipliers: Array
 
-    def thinned(self, every: int) -> Trajectory:
+    def thinned(self, every: int) -> "Trajectory":
         """Return the trajectory at every n-th step."""
         return Trajectory(self.t[::every], self.states[:, ::every], self.multipliers[::every])
 

@@ -1,7 +1,5 @@
 """Common functions of the adapters: import of an engine, checks of a mechanism, steps that end at samples."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from importlib import import_module
 from typing import Any, NoReturn

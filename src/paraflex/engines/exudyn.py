@@ -5,8 +5,6 @@ exact curvature and length of the centre line (cubic in position and slope vecto
 no floating frame and no assumption of small slopes.
 """
 
-from __future__ import annotations
-
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -14,10 +12,9 @@ from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from paraflex.actuation import FeedForward, actuation_condition
-from paraflex.arrays import Array
+from paraflex.arrays import Array, Indices
 from paraflex.dynamics import System
 from paraflex.engines.cables import Cable, Columns, Ground, Link, Linkage, RigidLink, RigidState, Trajectory
 from paraflex.engines.common import check_dwell, check_engine, import_engine, steps_between, with_rotors
@@ -112,9 +109,7 @@ def simulate_exudyn(task: TrackingTask, mode: str | ActuationMode, options: Exud
     torques = task.torques(mode)
     substeps = steps_between(task.motion.t, options.step)
     begin = time.perf_counter()
-    exu, items = import_engine("exudyn"), import_engine("exudyn.itemInterface")
-    container = exu.SystemContainer()
-    engine = _Engine(exu, items, container, container.AddSystem())
+    engine = _start_engine()
     with _silent(engine.exu):
         model = _build(engine, with_rotors(task), options.refinement)
         history, figures = _run(engine, model, task, torques, substeps, options)
@@ -163,6 +158,12 @@ class _Engine:
         return [self.marker(linkage, ref) for ref in (joint.a, joint.b)]
 
 
+def _start_engine() -> _Engine:
+    exu, items = import_engine("exudyn"), import_engine("exudyn.itemInterface")
+    container = exu.SystemContainer()
+    return _Engine(exu, items, container, container.AddSystem())
+
+
 @contextmanager
 def _silent(exu: Any) -> Iterator[None]:
     """Suppress Exudyn's printed errors and warnings; failures are exceptions here."""
@@ -179,7 +180,7 @@ class _Model(NamedTuple):
 
     linkage: Linkage
     loads: list[list[tuple[int, float]]]
-    rows: NDArray[np.int64]
+    rows: Indices
 
 
 def _build(engine: _Engine, task: TrackingTask, refinement: int) -> _Model:

@@ -5,8 +5,6 @@ remaining joints close loops. Springs are explicit, so the step size must resolv
 integrator is RK4.
 """
 
-from __future__ import annotations
-
 import threading
 import time
 from collections.abc import Iterator

@@ -1,7 +1,5 @@
 """Mechanism as a tree of bodies on hinges, for engines with joint coordinates, and the motion of its bodies."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

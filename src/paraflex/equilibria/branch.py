@@ -5,8 +5,6 @@ Each point is found by Newton's iteration from a step along the tangent, constra
 has a wanted value, and limit points at which it turns back, are solved for exactly.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from itertools import pairwise

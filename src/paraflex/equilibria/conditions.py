@@ -1,7 +1,5 @@
 """Conditions of equilibria: coordinates by name, and the loads, torques and displacements that a model proposes."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -136,7 +134,7 @@ class StaticsDefaults:
     )
     buckling: int = optional(1, "the number of buckling factors about every equilibrium")
 
-    def filled(self, **chosen: Any) -> StaticsDefaults:
+    def filled(self, **chosen: Any) -> "StaticsDefaults":
         """Replace defaults by chosen values that are not None; see `chosen_over` for loads, torques, displacements."""
         given = {name: value for name, value in chosen.items() if value is not None}
         return StaticsDefaults(**chosen_over(vars(self), given))

@@ -9,8 +9,6 @@ has more rows than the mechanism's own. With a fraction s of all given loads and
 so that the force of a held or moved coordinate on the mechanism is -mu.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -18,10 +16,9 @@ from typing import NamedTuple
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 from scipy.sparse import csr_matrix
 
-from paraflex.arrays import Array
+from paraflex.arrays import Array, Indices
 from paraflex.dynamics import State, System
 from paraflex.dynamics.constraints import coordinate_kind
 from paraflex.dynamics.signals import acting_loads
@@ -44,7 +41,7 @@ class Unknowns(NamedTuple):
     mu: Array
     s: float
 
-    def plus(self, change: Unknowns, part: float = 1.0) -> Unknowns:
+    def plus(self, change: "Unknowns", part: float = 1.0) -> "Unknowns":
         """Add a multiple of a change."""
         return Unknowns(self.q + part * change.q, self.mu + part * change.mu, self.s + part * change.s)
 
@@ -97,7 +94,7 @@ class Equations:
         return with_coordinates(self.system, joints, pins)
 
     @cached_property
-    def own(self) -> NDArray[np.int64]:
+    def own(self) -> Indices:
         """Rows of the extended system that are the mechanism's own, in its order."""
         number = {name: k for k, name in enumerate(self.extended.rows)}
         return np.array([number[name] for name in self.system.rows], dtype=int)
@@ -117,7 +114,7 @@ class Equations:
         return numbers
 
     @cached_property
-    def holding(self) -> NDArray[np.int64]:
+    def holding(self) -> Indices:
         """Rows that keep their value or follow a change: constraints, and coordinates held or moved."""
         own = [k for k in self.own.tolist() if self.extended.constrained[k]]
         extra = [self.number[one] for one in (*self.conditions.held, *self.conditions.moved)]
@@ -132,7 +129,7 @@ class Equations:
         return change
 
     @cached_property
-    def _loaded(self) -> tuple[NDArray[np.int64], Array]:
+    def _loaded(self) -> tuple[Indices, Array]:
         """Rows at which forces act, and the forces."""
         rows = np.array([self.number[one] for one in self.conditions.loads], dtype=int)
         return rows, np.array(list(self.conditions.loads.values()), dtype=float)
@@ -211,7 +208,7 @@ class Equations:
         mu = Saddle(found.mass, found.rows).solve(-self.residual(none)[0])[1]
         return none._replace(mu=mu)
 
-    def independent(self, rows: csr_matrix, more: csr_matrix | None = None) -> tuple[NDArray[np.int64], ...]:
+    def independent(self, rows: csr_matrix, more: csr_matrix | None = None) -> tuple[Indices, ...]:
         """Return which rows (rows, n) are independent of one another, and which of `more` are independent of these."""
         groups = [unit_in(part, self.scale) for part in (rows, more) if part is not None]
         entries = sum(int(np.prod(group.shape or ())) for group in groups)

@@ -1,16 +1,13 @@
 """Equilibria of a mechanism as a result: coordinates, forces, stability and stiffness in steps."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
 from paraflex.arguments import checked_arguments, named_in_errors
-from paraflex.arrays import Array
+from paraflex.arrays import Array, Indices, Mask
 from paraflex.display import Shown
 from paraflex.dynamics import System
 from paraflex.dynamics.points import point_motion
@@ -95,12 +92,12 @@ class Statics(Shown):
         return np.array([one.point.at.s for one in self.equilibria])
 
     @property
-    def limit(self) -> NDArray[np.bool_]:
+    def limit(self) -> Mask:
         """Mask (k,) of limit points."""
         return np.array([one.point.limit for one in self.equilibria], dtype=bool)
 
     @property
-    def stable(self) -> NDArray[np.bool_]:
+    def stable(self) -> Mask:
         """Mask (k,) of stable equilibria, with held and moved coordinates kept; limit points are not stable."""
         return np.array([one.vibrations.stable and not one.point.limit for one in self.equilibria], dtype=bool)
 
@@ -235,7 +232,7 @@ class Statics(Shown):
 
 
 def resting_solution(
-    system: System, q: Array, multipliers: Array, acting: NDArray[np.int64], status: str, message: str
+    system: System, q: Array, multipliers: Array, acting: Indices, status: str, message: str
 ) -> Solution:
     """Return samples at rest with coordinates (k, n) and multipliers (k, m), numbered in place of times.
 

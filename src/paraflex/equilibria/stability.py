@@ -1,7 +1,5 @@
 """Properties of an equilibrium: stability, natural frequencies, buckling, stiffness in named directions."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import NamedTuple
 

@@ -1,7 +1,5 @@
 """Static equilibria of a mechanism under loads and prescribed displacements, in steps along their branch."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 

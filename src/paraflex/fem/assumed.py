@@ -5,8 +5,6 @@ coordinates first. The functions define the body frame: sines attach it to the c
 to the tangent at the first end.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from math import ceil, pi

@@ -1,7 +1,5 @@
 """Eigenpairs of stiffness and mass matrices, accurate also for soft modes, and their complex-step derivatives."""
 
-from __future__ import annotations
-
 import numpy as np
 import scipy.linalg
 

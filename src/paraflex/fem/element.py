@@ -5,8 +5,6 @@ curvature. Lumped masses and moments of inertia at its ends are point contributi
 without them this is the common element (Remark 1).
 """
 
-from __future__ import annotations
-
 from functools import cache
 
 import numpy as np

@@ -5,8 +5,6 @@ s(x) = x0 + N u - 1/2 e_x f(x) with f(x) = int_0^x (N2' u)^2 dx. The beam is a s
 along it, at which the slopes are evaluated as well, then the lumps.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
@@ -42,7 +40,7 @@ class MassPoints:
     slope: Array
     weights: Array
 
-    def in_basis(self, basis: Array) -> MassPoints:
+    def in_basis(self, basis: Array) -> "MassPoints":
         """Transform the points to other flexible coordinates, u_old = basis @ u_new."""
         return replace(self, N=self.N @ basis, slope=self.slope @ basis)
 

@@ -1,7 +1,5 @@
 """Inertia shape integrals and stiffness of a body: the constants of its equations of motion (Eqs. 13-28)."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
@@ -111,13 +109,13 @@ class ShapeIntegrals:
         coupling = np.vstack([self.S2, self.G1 + self.Jf])
         return np.block([[rigid, coupling], [coupling.T, self.Mff]])
 
-    def in_basis(self, basis: Array) -> ShapeIntegrals:
+    def in_basis(self, basis: Array) -> "ShapeIntegrals":
         """Transform the body to other flexible coordinates, u_old = basis @ u_new."""
         rows = {name: getattr(self, name) @ basis for name in ("S2", "I1", "G1", "Jf", "D")}
         matrices = {name: basis.T @ getattr(self, name) @ basis for name in ("I2", "G2", "Jff", "K")}
         return replace(self, **rows, **matrices)
 
-    def without_flexibility(self) -> ShapeIntegrals:
+    def without_flexibility(self) -> "ShapeIntegrals":
         """Return the same body as a rigid one, all flexible coordinates held at zero (Remark 3)."""
         return self.in_basis(np.zeros((self.nf, 0)))
 

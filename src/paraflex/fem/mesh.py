@@ -1,7 +1,5 @@
 """Mesh of a straight beam: every named point is a node, and each span between nodes is divided into elements."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
@@ -110,7 +108,7 @@ class BeamMesh:
         """Return the indices of one of the four coordinates at every node."""
         return np.arange(coordinate, COORDINATES_PER_NODE * self.nodes.size, COORDINATES_PER_NODE)
 
-    def with_separate_curvature(self, nodes: Iterable[int]) -> BeamMesh:
+    def with_separate_curvature(self, nodes: Iterable[int]) -> "BeamMesh":
         """Return the mesh with separate curvatures at the given nodes; that of the last node, if given, is free."""
         return replace(self, separate=tuple(sorted(set(nodes))))
 

@@ -1,7 +1,5 @@
 """Eigenmodes of a body in its reference frame, which are the flexible coordinates of the kernels."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np
@@ -27,7 +25,7 @@ class ModalBasis:
     omega: Array
     vectors: Array
 
-    def like(self, other: ModalBasis, Mff: Array) -> ModalBasis:
+    def like(self, other: "ModalBasis", Mff: Array) -> "ModalBasis":
         """Match the modes to those of a slightly different body, and return them in its order and with its signs.
 
         Frequencies may cross as a body changes, and the sign of an eigenvector is arbitrary. Modes that are matched by

@@ -5,8 +5,6 @@ curvature of the last node, unless it is separate (it is zero in the paper's Eq.
 there). A beam of n elements has 4n flexible coordinates under each condition, and one more for each separate curvature.
 """
 
-from __future__ import annotations
-
 from enum import Enum
 
 import numpy as np

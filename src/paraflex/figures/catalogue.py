@@ -3,8 +3,6 @@
 A kind of results (`folders.kinds.ResultKind`) names the modules of its figures, or single figures as "module.figure".
 """
 
-from __future__ import annotations
-
 from collections.abc import Container, Mapping
 from functools import cache
 from importlib import import_module

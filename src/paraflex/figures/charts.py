@@ -3,16 +3,13 @@
 Numbers of a description are in SI units; what draws it converts them by `shown_units`.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal, NamedTuple
 
 import numpy as np
-from numpy.typing import ArrayLike
 
-from paraflex.arrays import Array
+from paraflex.arrays import Array, ArrayLike
 from paraflex.formatting import common_unit, display_unit, labelled
 from paraflex.units import DisplayUnit
 

@@ -1,7 +1,5 @@
 """Charts and tables of controllers: their settings, torques before and after limits, and readings."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
@@ -9,7 +7,8 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from paraflex.figures.charts import DOTTED, Array, Axis, Chart, Curve, look, stairs
+from paraflex.arrays import Array
+from paraflex.figures.charts import DOTTED, Axis, Chart, Curve, look, stairs
 from paraflex.figures.entry import figure
 from paraflex.figures.loads import run_columns
 from paraflex.figures.runs import after_motion

@@ -1,7 +1,5 @@
 """Table of many designs, with parameters, metrics and status, read from the files of a study, and charts of it."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -10,9 +8,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from paraflex.arrays import Array
+from paraflex.arrays import Array, Indices, Mask, NDArray
 from paraflex.campaign import read_tables
 from paraflex.errors import InputError, suggestion
 from paraflex.figures.charts import Axis, Chart, Curve, Mark, is_wide, look, stairs
@@ -63,8 +60,8 @@ class DesignTable:
     parameters: Mapping[str, Array]
     metrics: Mapping[str, Array]
     units: Mapping[str, str]
-    run: NDArray[np.int64]
-    design: NDArray[np.int64]
+    run: Indices
+    design: Indices
     path: NDArray[np.str_]
     mode: NDArray[np.str_]
     status: NDArray[np.str_]
@@ -72,18 +69,18 @@ class DesignTable:
     logarithmic: frozenset[str] = frozenset()
 
     @cached_property
-    def complete(self) -> NDArray[np.bool_]:
+    def complete(self) -> Mask:
         """Whether each run is complete, as an array (runs,)."""
         return self.status == "complete"
 
-    def only(self, rows: NDArray[np.bool_] | NDArray[np.intp]) -> DesignTable:
+    def only(self, rows: Mask | NDArray[np.intp]) -> "DesignTable":
         """Return the table restricted to some rows, given as a mask or as indices."""
         columns = (self.parameters, self.metrics)
         parameters, metrics = ({name: values[rows] for name, values in column.items()} for column in columns)
         rest = {name: getattr(self, name)[rows] for name in _OF_A_RUN}
         return replace(self, parameters=parameters, metrics=metrics, **rest)
 
-    def in_modes(self, modes: Sequence[str]) -> DesignTable:
+    def in_modes(self, modes: Sequence[str]) -> "DesignTable":
         """Return the table restricted to some actuation modes."""
         known = list(dict.fromkeys(self.mode.tolist()))
         for mode in modes:
@@ -99,7 +96,7 @@ class DesignTable:
         return {pair: np.array(rows) for pair, rows in found.items()}
 
     @property
-    def series(self) -> dict[tuple[str, str], DesignTable]:
+    def series(self) -> "dict[tuple[str, str], DesignTable]":
         """Complete runs of each pair of path and mode."""
         return {pair: self.only(rows) for pair, rows in self.series_rows.items()}
 

@@ -4,8 +4,6 @@ A kind of results (`folders.kinds.ResultKind`) names the modules of its figures.
 gallery of the documentation and the functions of `paraflex.plots` are made from the entries.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal

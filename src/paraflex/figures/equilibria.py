@@ -1,14 +1,13 @@
 """Charts and tables of static equilibria: force, stiffness and other quantities along the travel, buckling, loads."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 
 import numpy as np
 import xarray as xr
 
-from paraflex.figures.charts import DOTTED, PLAIN_LOOK, Array, Axis, Chart, Curve, Look, look
+from paraflex.arrays import Array
+from paraflex.figures.charts import DOTTED, PLAIN_LOOK, Axis, Chart, Curve, Look, look
 from paraflex.figures.entry import figure
 from paraflex.figures.selection import names_of
 from paraflex.figures.shapes import figure_of

@@ -1,7 +1,5 @@
 """Chart and table of a comparison of control laws in several actuation modes."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Charts and tables of linear models: gains, frequency responses, poles, zeros, frequencies and damping ratios."""
 
-from __future__ import annotations
-
 import json
 import math
 from collections.abc import Iterator, Sequence
@@ -10,8 +8,8 @@ from typing import Literal
 import numpy as np
 import xarray as xr
 
-from paraflex.arrays import Complex
-from paraflex.figures.charts import DASHED, DOTTED, N_COLOURS, PLAIN_LOOK, Array, Axis, Chart, Curve, Look, Span, look
+from paraflex.arrays import Array, Complex
+from paraflex.figures.charts import DASHED, DOTTED, N_COLOURS, PLAIN_LOOK, Axis, Chart, Curve, Look, Span, look
 from paraflex.figures.entry import NOTHING, figure
 from paraflex.figures.selection import names_of, place_of
 from paraflex.figures.tables import Column, Table

@@ -1,7 +1,5 @@
 """Charts and tables of the loads of runs: stresses of beams, joints, motors and prescribed motions, ground."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Any

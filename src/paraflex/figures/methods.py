@@ -1,7 +1,5 @@
 """Charts and tables of integration methods: work and precision, numerical damping."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Chart and table of actuation modes: how well each drives a mechanism along a path."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Charts of a run without a path: angles, speeds and energies, generalised coordinates, paths of points."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 

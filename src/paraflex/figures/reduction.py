@@ -1,7 +1,5 @@
 """Charts and tables of reduced linear models, and the table of runs of reduced bodies."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any

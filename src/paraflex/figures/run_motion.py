@@ -1,14 +1,13 @@
 """Charts of every run over time: motion and deflections of links, energies, motion of named points."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
 import xarray as xr
 
-from paraflex.figures.charts import DOTTED, Array, Axis, Chart, Curve, Look, look
+from paraflex.arrays import Array
+from paraflex.figures.charts import DOTTED, Axis, Chart, Curve, Look, look
 from paraflex.figures.entry import figure
 from paraflex.figures.runs import compared, followed, of_names, ranges, run_names, stopped_runs
 from paraflex.figures.selection import names_of, place_of, point_number

@@ -1,7 +1,5 @@
 """Tables of runs: results of every mode along paths, what happens after the motion, and the integration."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any, NamedTuple

@@ -1,7 +1,5 @@
 """Charts of quantities of runs over time: parts of the mechanism in one run, or one part in all runs."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import replace
@@ -9,8 +7,9 @@ from dataclasses import replace
 import numpy as np
 import xarray as xr
 
+from paraflex.arrays import Array
 from paraflex.errors import InputError
-from paraflex.figures.charts import DOTTED, Array, Axis, Chart, Curve, Look, Span, look
+from paraflex.figures.charts import DOTTED, Axis, Chart, Curve, Look, Span, look
 from paraflex.figures.selection import names_of, samples
 from paraflex.formatting import peak, text_symbol
 

@@ -1,13 +1,12 @@
 """Charts and tables of searches: convergence, parameters found, metrics or targets, and Sobol indices."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
-from paraflex.figures.charts import Array, Axis, Chart, Curve, Look, Mark, is_wide, look, stairs
+from paraflex.arrays import Array
+from paraflex.figures.charts import Axis, Chart, Curve, Look, Mark, is_wide, look, stairs
 from paraflex.figures.designs import column_label
 from paraflex.figures.entry import figure
 from paraflex.figures.tables import Column, Table, columns_of, in_row_units

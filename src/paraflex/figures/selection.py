@@ -1,7 +1,5 @@
 """Selection of the runs and points of a dataset that a figure shows."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

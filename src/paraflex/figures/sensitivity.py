@@ -1,7 +1,5 @@
 """Chart and tables of the derivatives of a run's metrics with respect to parameters."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Charts of the readings of sensors."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import numpy as np

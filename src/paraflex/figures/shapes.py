@@ -1,11 +1,8 @@
 """Drawn shapes of bodies: the stations that lines join, and points along lines."""
 
-from __future__ import annotations
-
 import numpy as np
-from numpy.typing import ArrayLike
 
-from paraflex.arrays import Array
+from paraflex.arrays import Array, ArrayLike
 
 
 def figure_of(places: Array) -> Array:

@@ -3,8 +3,6 @@
 Numbers are in SI units; `Table.texts` converts and formats them by the one rule of `formatting`.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
@@ -145,12 +143,12 @@ class Table:
         """Return the rows as text."""
         return [list(row) for row in zip(*(column.texts() for column in self.columns), strict=True)]
 
-    def filled(self) -> Table:
+    def filled(self) -> "Table":
         """Return the table without columns of numbers that have no value in any row."""
         kept = [c for c in self.columns if not c.is_numeric or any(_is_known(cell) for cell in c.cells)]
         return replace(self, columns=kept)
 
-    def in_one_unit(self) -> Table:
+    def in_one_unit(self) -> "Table":
         """Return the table with a common unit for all columns of numbers that have the same SI unit."""
         values: dict[str, list[float]] = {}
         for one in self.columns:
@@ -160,7 +158,7 @@ class Table:
             if one.is_numeric else one for one in self.columns
         ])  # fmt: skip
 
-    def thinned(self, rows: Sequence[int]) -> Table:
+    def thinned(self, rows: Sequence[int]) -> "Table":
         """Return the table with some of its rows; the title has their number and that of all rows."""
         count = len(self.columns[0].cells)
         if len(rows) == count:

@@ -1,7 +1,5 @@
 """Charts of runs along a path: errors, paths and motion of the end-effector, torques and condition of modes."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import replace

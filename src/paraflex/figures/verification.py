@@ -1,7 +1,5 @@
 """Charts and tables of a verification: all models of a mechanism in common charts, and their distances."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
@@ -9,7 +7,8 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from paraflex.figures.charts import Array, Axis, Chart, Curve, look
+from paraflex.arrays import Array
+from paraflex.figures.charts import Axis, Chart, Curve, look
 from paraflex.figures.entry import figure
 from paraflex.figures.run_motion import most_deflected
 from paraflex.figures.runs import after_motion, check_magnification, round_magnification

@@ -1,7 +1,5 @@
 """Dimensional analysis of expressions, as far as their units determine dimensions."""
 
-from __future__ import annotations
-
 import ast
 from collections.abc import Callable, Mapping
 from typing import Any

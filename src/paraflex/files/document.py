@@ -1,7 +1,5 @@
 """TOML output that preserves the comments, order and spelling of the file from which the data come."""
 
-from __future__ import annotations
-
 import tomllib
 from collections.abc import Collection, Mapping
 from typing import Any

@@ -3,8 +3,6 @@
 No code is executed. A unit stands directly behind a number; any other name is a parameter, a function or the time.
 """
 
-from __future__ import annotations
-
 import ast
 import math
 import operator

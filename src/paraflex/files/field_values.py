@@ -1,7 +1,5 @@
 """Explicit fields of a description, those that differ from their defaults, and checks of given fields."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import MISSING, fields
 from typing import Any

@@ -1,7 +1,5 @@
 """Fields of a file: their schema entries, the units that they accept, and the check of units in data."""
 
-from __future__ import annotations
-
 import re
 import typing
 from collections.abc import Iterable, Iterator, Mapping, Sequence

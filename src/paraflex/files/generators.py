@@ -1,7 +1,5 @@
 """Library mechanisms of variable size: "four_bars:3" names a model of three four-bars in a row."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 

@@ -1,15 +1,12 @@
 """Jets: values with their first and second time derivatives, computed exactly by truncated Taylor arithmetic."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 
-from paraflex.arrays import Array
+from paraflex.arrays import Array, ArrayLike
 
 
 @dataclass(frozen=True)
@@ -28,28 +25,28 @@ class Jet:
     __array_ufunc__ = None
 
     @classmethod
-    def time(cls, t: ArrayLike) -> Jet:
+    def time(cls, t: ArrayLike) -> "Jet":
         """Return the jet of the time itself at times t [s]."""
         t = np.asarray(t, dtype=float)
         return cls(t, np.ones_like(t), np.zeros_like(t))
 
     @classmethod
-    def constant(cls, value: float, like: Array) -> Jet:
+    def constant(cls, value: float, like: Array) -> "Jet":
         """Return the jet of a constant, in the shape of an array."""
         return cls(np.full_like(like, value), np.zeros_like(like), np.zeros_like(like))
 
-    def through(self, f: Array, df: Array, ddf: Array) -> Jet:
+    def through(self, f: Array, df: Array, ddf: Array) -> "Jet":
         """Return the jet of f(self), from f and its first two derivatives at the value."""
         return Jet(f, df * self.rate, ddf * self.rate**2 + df * self.acceleration)
 
-    def _other(self, other: Any) -> Jet:
+    def _other(self, other: Any) -> "Jet":
         return other if isinstance(other, Jet) else Jet.constant(float(other), self.value)
 
-    def __add__(self, other: Any) -> Jet:
+    def __add__(self, other: Any) -> "Jet":
         o = self._other(other)
         return Jet(self.value + o.value, self.rate + o.rate, self.acceleration + o.acceleration)
 
-    def __mul__(self, other: Any) -> Jet:
+    def __mul__(self, other: Any) -> "Jet":
         o = self._other(other)
         return Jet(
             self.value * o.value,
@@ -57,7 +54,7 @@ class Jet:
             self.acceleration * o.value + 2.0 * self.rate * o.rate + self.value * o.acceleration,
         )
 
-    def __pow__(self, other: Any) -> Jet:
+    def __pow__(self, other: Any) -> "Jet":
         if isinstance(other, Jet):
             return exp(log(self) * other)
         n, x = float(other), self.value
@@ -68,25 +65,25 @@ class Jet:
 
         return self.through(x**n, term(n, n - 1.0), term(n * (n - 1.0), n - 2.0))
 
-    def __rpow__(self, base: Any) -> Jet:
+    def __rpow__(self, base: Any) -> "Jet":
         return exp(self * np.log(float(base)))
 
-    def __truediv__(self, other: Any) -> Jet:
+    def __truediv__(self, other: Any) -> "Jet":
         return self * self._other(other) ** -1.0
 
-    def __rtruediv__(self, other: Any) -> Jet:
+    def __rtruediv__(self, other: Any) -> "Jet":
         return self._other(other) / self
 
-    def __sub__(self, other: Any) -> Jet:
+    def __sub__(self, other: Any) -> "Jet":
         return self + self._other(other) * -1.0
 
-    def __rsub__(self, other: Any) -> Jet:
+    def __rsub__(self, other: Any) -> "Jet":
         return self._other(other) - self
 
-    def __neg__(self) -> Jet:
+    def __neg__(self) -> "Jet":
         return self * -1.0
 
-    def __pos__(self) -> Jet:
+    def __pos__(self) -> "Jet":
         return self
 
     __radd__ = __add__

@@ -1,7 +1,5 @@
 """Library of mechanisms that come with the package."""
 
-from __future__ import annotations
-
 from importlib.resources import files
 from importlib.resources.abc import Traversable
 

@@ -1,7 +1,5 @@
 """Construction of mechanisms and paths from the tables of a model file."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any, cast
 

@@ -1,7 +1,5 @@
 """Update of the data of a file after a change of the model that they describe."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping
 from typing import Any
 

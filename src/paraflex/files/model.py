@@ -1,7 +1,5 @@
 """Model: the mechanism of a file, with its named paths and the defaults of its study."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path as FilePath

@@ -1,7 +1,5 @@
 """Permission for models to read files outside their folders, withheld by default because a model may be untrusted."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from contextlib import contextmanager
 from contextvars import ContextVar

@@ -1,7 +1,5 @@
 """Lookup and replacement of values of a model file by field name, before the file is validated."""
 
-from __future__ import annotations
-
 import re
 import tomllib
 from collections.abc import Iterator, Mapping, Sequence

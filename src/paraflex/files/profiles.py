@@ -1,7 +1,5 @@
 """Reading and writing of time profiles in files: constants, constant speeds, expressions of t, pieces, and tables."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any

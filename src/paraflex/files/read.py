@@ -1,7 +1,5 @@
 """Reading and validation of TOML files, with errors that name file, field, value and remedy."""
 
-from __future__ import annotations
-
 import re
 import tomllib
 import typing

@@ -3,8 +3,6 @@
 Headings may give units in brackets, "t [ms], x [N]"; columns without units are in SI units.
 """
 
-from __future__ import annotations
-
 import copy
 import re
 import tomllib

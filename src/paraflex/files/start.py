@@ -1,7 +1,5 @@
 """Reading of the [start] table of a model file."""
 
-from __future__ import annotations
-
 from paraflex.files.schema import DeflectionTable, StartTable
 from paraflex.mechanism import BodyValues, Deflection, Mechanism, PointRef, Start, check_start
 

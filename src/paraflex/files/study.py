@@ -1,7 +1,5 @@
 """Default settings of the runs of a model, from its [study] table."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any, Literal
@@ -107,7 +105,7 @@ class StudyDefaults:
         """Name of the path, or of the first of several; None if there is none."""
         return self.path or next(iter(self.paths), None)
 
-    def filled(self, **chosen: Any) -> StudyDefaults:
+    def filled(self, **chosen: Any) -> "StudyDefaults":
         """Return the study with the chosen values replaced; None and empty strings leave a value unchanged."""
         return replace(self, **{name: value for name, value in chosen.items() if value not in (None, "")})
 

@@ -1,7 +1,5 @@
 """Conversion of a model to the tables of its file: mechanism, paths, controllers, start, study and statics."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from enum import Enum
 from itertools import count

@@ -3,8 +3,6 @@
 A change takes effect when `.new`, complete with its manifest, is renamed to `.ready`.
 """
 
-from __future__ import annotations
-
 import os
 import re
 import shutil

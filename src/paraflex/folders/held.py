@@ -1,7 +1,5 @@
 """Folder of results locked for writing, whose files are replaced or extended atomically."""
 
-from __future__ import annotations
-
 import shutil
 from collections.abc import Callable, Container, Iterator, Sequence
 from contextlib import ExitStack, contextmanager, suppress

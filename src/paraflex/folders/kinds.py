@@ -1,7 +1,5 @@
 """Kinds of results: one record for each, read by folders, storage, exports, figures, reports and commands."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any

@@ -1,7 +1,5 @@
 """Lock of a folder of results: one process at a time writes to it, and a killed process leaves no lock."""
 
-from __future__ import annotations
-
 import sqlite3
 import time
 from collections.abc import Iterator

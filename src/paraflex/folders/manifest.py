@@ -1,7 +1,5 @@
 """Content of a folder of results: its manifest, the kind of its results, and files not written by paraflex."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 import os
@@ -52,7 +50,7 @@ class Manifest:
     contents: Mapping[str, str]
 
     @classmethod
-    def of(cls, kind: str, files: Mapping[str, str], contents: Mapping[str, str]) -> Manifest:
+    def of(cls, kind: str, files: Mapping[str, str], contents: Mapping[str, str]) -> "Manifest":
         """Build the manifest of files from their digests; further files in `contents` are ignored."""
         contents = {name: contents[name] for name in sorted(files) if name in contents}
         numbers = [f"{name} {contents.get(name, files[name])}" for name in sorted(files) if not _is_derived(name)]

@@ -1,7 +1,5 @@
 """Points that reach the ends of their beams: refused at the start, detected in a run, reported after it."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 

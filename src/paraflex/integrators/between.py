@@ -4,17 +4,14 @@ A run keeps few samples of many steps. Its time loop takes additional samples at
 loads are computed again; the requested samples are kept.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from paraflex.arrays import Array
+from paraflex.arrays import Array, Mask
 from paraflex.dynamics import System
 from paraflex.dynamics.joint_loads import drive_torques, joint_loads
 from paraflex.dynamics.sections import sections_of
@@ -52,7 +49,7 @@ class RefinedTimes(NamedTuple):
     """
 
     times: Array
-    stored: NDArray[np.bool_]
+    stored: Mask
 
     def kept(self, solution: Solution) -> Solution:
         """Return the solution with the requested samples and the state at an event only."""

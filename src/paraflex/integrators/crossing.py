@@ -1,7 +1,5 @@
 """Marching to the first event: detected within each step and located there, with the state at the event."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any

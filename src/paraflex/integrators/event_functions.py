@@ -1,7 +1,5 @@
 """Event functions: a function of the pose for each event, and its bounds."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Events that end a run: a joint at its limit, the deflection of a link at its limit, a nearby singular position."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass

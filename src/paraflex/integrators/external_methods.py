@@ -1,7 +1,5 @@
 """Methods of SciPy and SUNDIALS: their properties and parameters."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import ClassVar
 

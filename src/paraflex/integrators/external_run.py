@@ -1,7 +1,5 @@
 """Runs by external solvers: stops, samples, energies and counts around a `Stepper`."""
 
-from __future__ import annotations
-
 import math
 import time
 

@@ -4,14 +4,11 @@ An `OdeForm` has y = (q, v, work), with multipliers eliminated; the two forms fo
 work done is integrated with the motion, but does not affect the step size.
 """
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from paraflex.arrays import Array
+from paraflex.arrays import Array, Indices
 from paraflex.dynamics import System, dependence, inputs_of
 from paraflex.integrators.options import IntegrationOptions
 from paraflex.integrators.run import DEPENDENT_PART, Problem
@@ -126,7 +123,7 @@ class DescriptorForm(OdeForm):
         return 2 * self.system.n + self.multipliers * self.system.m + 1
 
     @property
-    def algebraic(self) -> NDArray[np.int64]:
+    def algebraic(self) -> Indices:
         """Indices of the unknowns without a derivative."""
         return np.arange(2 * self.system.n, self.size - 1)
 

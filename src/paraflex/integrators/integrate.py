@@ -1,7 +1,5 @@
 """Integration of a system by any method in slices of steps, with checks of events, interrupts and limits in between."""
 
-from __future__ import annotations
-
 import copy
 import time
 from collections.abc import Callable

@@ -1,7 +1,5 @@
 """Longest steps that resolve the inputs: loads, torques and prescribed motions."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

@@ -5,16 +5,13 @@
 M and K are constant and block diagonal, with one small block per body; rows of C may depend on one another.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
 import scipy
-from numpy.typing import NDArray
 
-from paraflex.arrays import Array
+from paraflex.arrays import Array, Indices, NDArray
 from paraflex.errors import IntegrationError, Moment
 from paraflex.integrators.newmark import NewmarkNumbers
 
@@ -115,7 +112,7 @@ class _Condensed(NamedTuple):
     load: Array
     react: Array
     close: Array
-    rank: NDArray[np.int64]
+    rank: Indices
 
 
 def _inverses(blocks: Sequence[Block], weight: float) -> list[NDArray[np.floating]]:
@@ -141,7 +138,7 @@ def _condense(blocks: Sequence[Block], inverses: Sequence[NDArray[np.floating]],
     return _Condensed(load, react, close, rank)
 
 
-def _pseudo_inverses(schur: Array) -> tuple[Array, NDArray[np.int64]]:
+def _pseudo_inverses(schur: Array) -> tuple[Array, Indices]:
     """Return inverses of symmetric matrices (k, m, m) without dependent rows, and the number of independent rows."""
     # Rows in metres and in radians are scaled to the same size before their rank is determined.
     size = 1.0 / np.sqrt(np.diagonal(schur, axis1=1, axis2=2))

@@ -1,7 +1,5 @@
 """Integration methods: frozen objects that check their parameters and have all properties that runs need."""
 
-from __future__ import annotations
-
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields

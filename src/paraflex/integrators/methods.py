@@ -4,8 +4,6 @@ A method is an object with its own parameters: `GeneralisedAlpha(spectral_radius
 also take its name, which stands for the method with its default parameters.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from types import MappingProxyType
 

@@ -1,14 +1,11 @@
 """Runs of the compiled schemes: the kernel's time loop in slices."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from paraflex.arrays import Array
+from paraflex.arrays import Array, Indices
 from paraflex.dynamics import System, inputs_of
 from paraflex.dynamics.linearise import slowest_deflection
 from paraflex.errors import InputError
@@ -171,7 +168,7 @@ class NativeRun:
             multiplier_errors=_FORCE_SAFETY * state.forces[at.UNRESOLVED] if estimated else None,
         )
 
-    def until(self, time: float) -> NativeRun:
+    def until(self, time: float) -> "NativeRun":
         """Return the same run with a step that ends at a time before its end, where it pauses."""
         before = self.problem.stops[self.problem.stops < time]
         self.state.counts[at.STOP] = 0
@@ -219,7 +216,7 @@ def _mark_redundant(system: System, q: Array, workspace: Workspace) -> int:
     return count
 
 
-def _turning(system: System) -> NDArray[np.int64]:
+def _turning(system: System) -> Indices:
     """Return the indices of the angles of bodies on which forces depend on the orientation.
 
     A rigid body with all its points and its centre of mass at its origin is not among them.

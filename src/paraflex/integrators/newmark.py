@@ -1,7 +1,5 @@
 """Newmark family: coefficients of its members, from the parameters of each method."""
 
-from __future__ import annotations
-
 from abc import abstractmethod
 from dataclasses import dataclass
 from typing import ClassVar
@@ -38,7 +36,7 @@ class NewmarkNumbers:
     theta: float = 1.0
 
     @classmethod
-    def damped(cls, alpha_m: float, alpha_f: float) -> NewmarkNumbers:
+    def damped(cls, alpha_m: float, alpha_f: float) -> "NewmarkNumbers":
         """Return coefficients of second order with the beta of the largest damping at high frequencies."""
         gamma = 0.5 + alpha_f - alpha_m
         return cls(alpha_m, alpha_f, 0.25 * (0.5 + gamma) ** 2, gamma)

@@ -1,7 +1,5 @@
 """Options of an integration, with checks."""
 
-from __future__ import annotations
-
 import json
 import math
 from dataclasses import InitVar, dataclass, replace
@@ -148,7 +146,7 @@ class IntegrationOptions(CheckedFields):
             return self.tolerance
         return _whole_size(system) * (RELATIVE_TOLERANCE if system.n_flexible else RELATIVE_TOLERANCE_RIGID)
 
-    def for_system(self, system: System) -> IntegrationOptions:
+    def for_system(self, system: System) -> "IntegrationOptions":
         """Return the same options with the tolerance that they have for a system."""
         per = self.per if self.controls_errors else None
         return replace(self, tolerance=self.tolerance_for(system), tolerance_per=per)

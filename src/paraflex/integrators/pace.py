@@ -1,7 +1,5 @@
 """Pace of a run: a run whose steps become so small that it would hardly end is stopped early."""
 
-from __future__ import annotations
-
 import math
 from collections import deque
 

@@ -3,17 +3,14 @@
 Steps end where torques, loads or prescribed motions jump.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from math import factorial
 from typing import Protocol
 
 import numpy as np
 from numpy.polynomial.polynomial import polyder, polyval
-from numpy.typing import NDArray
 
-from paraflex.arrays import Array
+from paraflex.arrays import Array, Mask
 from paraflex.dynamics import Inputs, State, System, inputs_of
 from paraflex.errors import InputError
 from paraflex.integrators.limits import StepLimits, step_limits
@@ -61,7 +58,7 @@ class Problem:
     stops: Array
     jumps: Array
     limits: StepLimits
-    stored: NDArray[np.bool_]
+    stored: Mask
 
     @property
     def span(self) -> float:
@@ -190,7 +187,7 @@ def make_problem(
     return Problem(system, signals, initial, times, np.append(inner, times[-1]), jumps, limits, stored)
 
 
-def empty_samples(times: Array, system: System, stored: NDArray[np.bool_] | None = None) -> Samples:
+def empty_samples(times: Array, system: System, stored: Mask | None = None) -> Samples:
     """Return samples to be filled."""
     stored = np.ones(times.size, dtype=bool) if stored is None else np.ascontiguousarray(stored)
     given = {"times": times, "stored": stored, "solved": np.zeros(times.size, dtype=bool)}

@@ -1,7 +1,5 @@
 """SciPy's solvers of ordinary differential equations, one step at a time: a `Stepper`."""
 
-from __future__ import annotations
-
 import math
 import warnings
 

@@ -1,7 +1,5 @@
 """Forward sensitivities of a run: its steps are solved to rounding and differentiated stage by stage."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple

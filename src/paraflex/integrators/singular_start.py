@@ -6,8 +6,6 @@ t^2 / 2 + j t^3 / 6, the terms of third order, w (Phi''' + 3 Phi'' a) with Phi''
 jerk j.
 """
 
-from __future__ import annotations
-
 from functools import partial
 from math import sqrt
 from typing import NamedTuple

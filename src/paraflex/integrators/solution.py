@@ -7,9 +7,8 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
-from paraflex.arrays import Array
+from paraflex.arrays import Array, Indices
 from paraflex.findings import Finding
 
 if TYPE_CHECKING:
@@ -96,7 +95,7 @@ class Solution:
     brake_energy: float = 0.0
     findings: tuple[Finding, ...] = ()
     resting: bool = False
-    acting: NDArray[np.int64] | None = None
+    acting: Indices | None = None
     options: IntegrationOptions | None = None
 
     def instant(self, sample: int, digits: int = 3) -> str:

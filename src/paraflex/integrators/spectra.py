@@ -4,22 +4,19 @@ A step multiplies a vector of values by a matrix (for multistep methods a compan
 method's characteristic roots. The principal root is the one that approximates exp(i h omega).
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import scipy
-from numpy.typing import ArrayLike, NDArray
 
+from paraflex.arrays import ArrayLike, NDArray, Numbers
 from paraflex.errors import InputError
 from paraflex.integrators.methods import METHODS, NDF, RK45, Adams, Method, Radau, find_method
 from paraflex.integrators.newmark import NewmarkMethod, NewmarkNumbers
 from paraflex.integrators.tableaux import ESDIRK
 
-Array = NDArray[Any]
 Roots = NDArray[Any]
 
 # Coefficients of NDF of orders 0 to 5, as in SciPy: Shampine and Reichelt (1997), Table 1.
@@ -44,24 +41,24 @@ class Spectrum:
         Spectral radius, the largest modulus of all roots; above 1 the method is unstable.
     """
 
-    frequency: Array
+    frequency: Numbers
     principal: Roots
-    phase: Array
-    radius: Array
+    phase: Numbers
+    radius: Numbers
 
     @property
-    def damping_ratio(self) -> Array:
+    def damping_ratio(self) -> Numbers:
         """Damping ratio of the numerical vibration (Hughes 1987, 9.1); the exact one is zero."""
         with np.errstate(divide="ignore"):
             return -np.log(np.abs(self.principal)) / self.phase
 
     @property
-    def amplitude_decay(self) -> Array:
+    def amplitude_decay(self) -> Numbers:
         """Fraction of the amplitude lost in a period."""
         return 1.0 - np.exp(-2.0 * np.pi * self.damping_ratio)
 
     @property
-    def period_error(self) -> Array:
+    def period_error(self) -> Numbers:
         """Error of the vibration's period as a fraction of the exact one; positive if it is too long."""
         return self.frequency / self.phase - 1.0
 
@@ -133,7 +130,7 @@ def _roots(method: Method, order: int | None) -> Callable[[float], Roots]:
     return lambda x: np.array([stability(A, b, 1j * x)])
 
 
-def tableau_of(method: Method) -> tuple[Array, Array]:
+def tableau_of(method: Method) -> tuple[Numbers, Numbers]:
     """Return the matrix A and weights b of a Runge-Kutta method.
 
     Raises
@@ -152,12 +149,12 @@ def tableau_of(method: Method) -> tuple[Array, Array]:
     )
 
 
-def stability(A: Array, b: Array, z: complex) -> complex:
+def stability(A: Numbers, b: Numbers, z: complex) -> complex:
     """Return R(z) = 1 + z b (1 - z A)^-1 1 of a Runge-Kutta method, the factor of a step for x' = z/h x."""
     return complex(1.0 + z * (b @ np.linalg.solve(np.eye(b.size) - z * A, np.ones(b.size))))
 
 
-def _collocation(*nodes: float) -> tuple[Array, Array]:
+def _collocation(*nodes: float) -> tuple[Numbers, Numbers]:
     """Return the tableau of collocation at nodes of which the last is 1: integrals of Lagrange polynomials."""
     A = np.zeros((len(nodes), len(nodes)))
     for j, own in enumerate(nodes):
@@ -167,7 +164,7 @@ def _collocation(*nodes: float) -> tuple[Array, Array]:
     return A, A[-1]
 
 
-def newmark_step(x: float, numbers: NewmarkNumbers) -> Array:
+def newmark_step(x: float, numbers: NewmarkNumbers) -> Numbers:
     """Return the matrix of a step for (x, h x', h^2 a), where a is the algorithmic acceleration.
 
     Balance holds at both ends of the step.
@@ -181,7 +178,7 @@ def newmark_step(x: float, numbers: NewmarkNumbers) -> Array:
     return np.linalg.solve(new, old)
 
 
-def wilson_step(x: float, theta: float) -> Array:
+def wilson_step(x: float, theta: float) -> Numbers:
     """Return the matrix of a step for (x, h x', h^2 x''): acceleration linear up to theta h, equilibrium there."""
     stiffness = (x * theta) ** 2
     # theta^2 a_theta = -stiffness x_theta,  x_theta = x + theta x' + theta^2 (2 a + a_theta) / 6
@@ -196,7 +193,7 @@ def wilson_step(x: float, theta: float) -> Array:
     )
 
 
-def multistep_formula(method: Method, order: int | None) -> tuple[Array, Array]:
+def multistep_formula(method: Method, order: int | None) -> tuple[Numbers, Numbers]:
     """Return coefficients of new and old values and of their derivatives, the newest first, padded to one length."""
     # A run may limit the order further.
     highest = int(method.parameters["max_order"].high) if "max_order" in method.parameters else method.order
@@ -212,7 +209,7 @@ def multistep_formula(method: Method, order: int | None) -> tuple[Array, Array]:
     return np.pad(values, (0, size - values.size)), np.pad(rates, (0, size - rates.size))
 
 
-def _backward_differences(order: int, numerical: bool) -> tuple[Array, Array]:
+def _backward_differences(order: int, numerical: bool) -> tuple[Numbers, Numbers]:
     """Return the coefficients of sum_m (1/m) D^m x_1 - kappa gamma D^(k+1) x_1 = h x_1', D x_1 = x_1 - x_0.
 
     kappa = 0 gives Gear's formula.
@@ -225,7 +222,7 @@ def _backward_differences(order: int, numerical: bool) -> tuple[Array, Array]:
     return values.coef, np.array([1.0])
 
 
-def _adams(order: int) -> tuple[Array, Array]:
+def _adams(order: int) -> tuple[Numbers, Numbers]:
     """Return the coefficients of an Adams-Moulton formula.
 
     x_1 - x_0 is h times the integral of the polynomial through the newest `order` rates, including the new one.

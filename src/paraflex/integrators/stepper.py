@@ -1,7 +1,5 @@
 """Interface of an external solver: take one step at a time, stop at a time, interpolate within the step."""
 
-from __future__ import annotations
-
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -23,7 +21,7 @@ class SolverCounts(NamedTuple):
     iterations: int
     factorisations: int
 
-    def __add__(self, other: SolverCounts) -> SolverCounts:  # type: ignore[override]
+    def __add__(self, other: "SolverCounts") -> "SolverCounts":  # type: ignore[override]
         """Return the sum of both counts."""
         return SolverCounts(*(a + b for a, b in zip(self, other, strict=True)))
 

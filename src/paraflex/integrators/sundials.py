@@ -1,7 +1,5 @@
 """CVODE and IDA of SUNDIALS through scikit-sundae, one step at a time: each a `Stepper`."""
 
-from __future__ import annotations
-
 import contextlib
 import io
 import math

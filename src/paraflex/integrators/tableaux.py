@@ -1,7 +1,5 @@
 """ESDIRK schemes with their Butcher tableaux: explicit first stage, one diagonal element, stiffly accurate."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from fractions import Fraction
 from math import sqrt

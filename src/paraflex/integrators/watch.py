@@ -1,7 +1,5 @@
 """Checks of a run between slices of the time loop, and multipliers of dependent rows at its end."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

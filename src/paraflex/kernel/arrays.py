@@ -5,20 +5,18 @@ the loop, which rounds differently. Whether small arrays lie close depends on th
 runs would differ by rounding.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from functools import cache
 from math import prod
 from typing import Any, TypeVar, get_type_hints
 
 import numpy as np
-from numpy.typing import NDArray
 
+from paraflex.arrays import Array, Indices, NDArray
 from paraflex.kernel.compiling import inlined, routine
 
-Floats = NDArray[np.float64]
-Ints = NDArray[np.int64]
+Floats = Array
+Ints = Indices
 R = TypeVar("R")
 # Unused entries before and after an array: more than a vectorised loop processes at once.
 ROOM = 128

@@ -8,8 +8,6 @@ below the point, a *track*. A distance joint prescribes the value |d| of an axis
 = e x d'/|d|, n . d = 0.
 """
 
-from __future__ import annotations
-
 from math import atan2, cos, sin
 
 from paraflex.kernel.compiling import inlined, kernel, routine

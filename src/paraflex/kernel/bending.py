@@ -5,8 +5,6 @@ points j between it and the first end. Its forces on (r, phi, u) are m p'', m (R
 p'' as for any point. The mass matrix is the sum of m J^T J, which is positive definite however large the deflection.
 """
 
-from __future__ import annotations
-
 from math import cos, sin, sqrt
 
 from paraflex.kernel.compiling import inlined, kernel, routine

@@ -4,8 +4,6 @@ Flexible coordinates are mass-normalised modes of the body in its frame, so M_ff
 diagonal if the body's joints hold it as its frame does.
 """
 
-from __future__ import annotations
-
 from math import cos, sin
 
 from paraflex.kernel.bending import second_order_energy, second_order_equations, second_order_shortening

@@ -1,7 +1,5 @@
 """Closure of a mechanism for a given motion of the end-effector: positions, velocities and accelerations."""
 
-from __future__ import annotations
-
 from typing import Annotated, NamedTuple
 
 from paraflex.kernel import joints

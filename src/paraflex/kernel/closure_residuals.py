@@ -1,7 +1,5 @@
 """Residuals of the equations of closed loops for a given motion, used for derivatives."""
 
-from __future__ import annotations
-
 from paraflex.kernel.closure import closure_jacobian, second_derivatives
 from paraflex.kernel.compiling import releases_lock
 from paraflex.kernel.constraints import constraint_values

@@ -1,7 +1,5 @@
 """Decorators that compile kernels: cached on disk, free to reorder sums, with or without own changes to Numba."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from functools import update_wrapper
 from types import FunctionType

@@ -1,7 +1,5 @@
 """Constraints of the whole system: values, Jacobian, and rates and slopes of compliant rows."""
 
-from __future__ import annotations
-
 from math import cosh
 
 from paraflex.kernel import joints

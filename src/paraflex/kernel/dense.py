@@ -1,7 +1,5 @@
 """Gaussian elimination of small dense systems, which compiles in one second; a LAPACK call takes eight."""
 
-from __future__ import annotations
-
 from paraflex.kernel.compiling import kernel
 
 

@@ -5,8 +5,6 @@ llvmlite and NumPy has a folder of its own, and code compiled from another state
 machine code, which must not be loaded if damaged: each begins with a digest of the rest.
 """
 
-from __future__ import annotations
-
 import hashlib
 import os
 import pickle

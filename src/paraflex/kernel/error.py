@@ -3,8 +3,6 @@
 Without the filter (Hosea and Shampine 1996) an undamped axial mode would determine the step size.
 """
 
-from __future__ import annotations
-
 from math import exp, isinf
 
 from paraflex.kernel import indices as at

@@ -7,8 +7,6 @@ and keeps an old factor accurate. In second-order geometry, and if damping coupl
 `kernel.bending`.
 """
 
-from __future__ import annotations
-
 from math import sqrt
 
 from paraflex.kernel.arrays import fill

@@ -6,8 +6,6 @@ accelerations needs no separate formula. A marker's angle is phi + N2' u. In sec
 reduced by f/2, f'/2 and f''/2 along x.
 """
 
-from __future__ import annotations
-
 from math import cos, sin, sqrt, tanh
 
 from paraflex.kernel.compiling import inlined, kernel, routine

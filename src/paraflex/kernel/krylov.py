@@ -6,8 +6,6 @@ minimal residual method needs only products with the exact matrix, and converges
 Schultz, 1986).
 """
 
-from __future__ import annotations
-
 from math import hypot, sqrt
 from typing import Annotated, NamedTuple
 

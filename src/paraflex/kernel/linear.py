@@ -5,8 +5,6 @@ It is stored and factored within its envelope; the rows are ordered once, when t
 of a row is the part of its diagonal entry that remains when the rows before it are eliminated.
 """
 
-from __future__ import annotations
-
 from math import cos, sin, sqrt
 
 from paraflex.kernel.arrays import fill

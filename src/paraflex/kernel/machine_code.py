@@ -9,8 +9,6 @@ all others too) by atomic operations, which cost more than the arithmetic. Kerne
 them.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from functools import cache, cached_property
 from typing import Any

@@ -1,7 +1,5 @@
 """Time loop: accepted and rejected steps, step size control, energy, dense output."""
 
-from __future__ import annotations
-
 from math import ceil, inf, pi, sqrt
 
 from paraflex.kernel import indices as at, samples

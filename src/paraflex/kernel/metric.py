@@ -1,7 +1,5 @@
 """Product of a vector with the mass matrix at the deformation of the factor, and the norm by that matrix, in metres."""
 
-from __future__ import annotations
-
 from math import sqrt
 
 from paraflex.kernel.bending import second_order_mass_square, second_order_mass_times

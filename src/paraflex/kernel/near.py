@@ -8,8 +8,6 @@ the accelerations as extrapolated from earlier stages: the constraints' second d
 The step size is kept meanwhile, so that a few steps span the position.
 """
 
-from __future__ import annotations
-
 from math import sqrt
 
 from paraflex.kernel import indices as at

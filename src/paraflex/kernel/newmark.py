@@ -9,8 +9,6 @@ is adjusted if h changes. Wilson's method assumes a linear acceleration up to t 
 there, and projects its result at t + h onto the constraints and their two derivatives.
 """
 
-from __future__ import annotations
-
 from paraflex.kernel import indices as at
 from paraflex.kernel.arrays import add, copy
 from paraflex.kernel.compiling import routine

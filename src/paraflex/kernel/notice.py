@@ -4,8 +4,6 @@ They go through Python's logging, under the name "paraflex": to standard error w
 nowhere after `logging.getLogger("paraflex").setLevel("ERROR")`. Each is issued once per process.
 """
 
-from __future__ import annotations
-
 import logging
 import multiprocessing
 from collections.abc import Callable

@@ -3,8 +3,6 @@
 A third part is added to (q, v), the work done so far, so that a solver integrates the power with the motion.
 """
 
-from __future__ import annotations
-
 from paraflex.kernel.arrays import copy, fill
 from paraflex.kernel.compiling import kernel, routine
 from paraflex.kernel.constraints import constraint_values, note_friction

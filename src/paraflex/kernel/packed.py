@@ -6,13 +6,11 @@ each port is an end on a moving body, and several may be on one body. A rotary m
 its joint; a linear motor is an axis.
 """
 
-from __future__ import annotations
-
 from typing import Annotated, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from paraflex.arrays import Array, Indices, Records
 from paraflex.kernel.arrays import Floats, allocated, apart
 from paraflex.kernel.compiling import by_reference
 from paraflex.kernel.vectors import padded
@@ -148,46 +146,46 @@ ROW = _record(
 class PackedSystem(NamedTuple):
     """Constants of a system."""
 
-    bodies: NDArray[np.void]
-    markers: NDArray[np.void]
-    ports: NDArray[np.void]
-    motor_sides: NDArray[np.void]
-    loads: NDArray[np.void]
-    lines: NDArray[np.void]  # springs and dampers between points
-    axes: NDArray[np.void]
-    tracks: NDArray[np.void]
-    track_breaks: NDArray[np.float64]
-    track_coefficients: NDArray[np.float64]
-    rows: NDArray[np.void]
-    modal: NDArray[np.float64]  # (6, total nf): S2x, S2y, I1, G1 + Jf, omega^2, diagonal of the damping matrix
-    damping: NDArray[np.float64]  # nf x stride, off-diagonal part of the damping matrix of bodies that have one
-    I2: NDArray[np.float64]  # nf x nf matrix of every body, row by row
-    G2: NDArray[np.float64]
-    shape: NDArray[np.float64]  # (3, total): Nx, Ny, N2' of every marker
+    bodies: Records
+    markers: Records
+    ports: Records
+    motor_sides: Records
+    loads: Records
+    lines: Records  # springs and dampers between points
+    axes: Records
+    tracks: Records
+    track_breaks: Array
+    track_coefficients: Array
+    rows: Records
+    modal: Array  # (6, total nf): S2x, S2y, I1, G1 + Jf, omega^2, diagonal of the damping matrix
+    damping: Array  # nf x stride, off-diagonal part of the damping matrix of bodies that have one
+    I2: Array  # nf x nf matrix of every body, row by row
+    G2: Array
+    shape: Array  # (3, total): Nx, Ny, N2' of every marker
     # The same data laid out for vectors: contributions of a body's coordinates to its sums (see `kernel.sums`), and
     # columns of G2 and I2.
-    columns: NDArray[np.float64]
-    products: NDArray[np.float64]
+    columns: Array
+    products: Array
     # Data of second-order geometry. `bending` is None without second-order geometry and dense iteration matrices;
     # kernels are then compiled without the code for these.
-    bending: NDArray[np.float64] | None  # nf x stride matrix of every marker that bending displaces: f = u . bending u
+    bending: Array | None  # nf x stride matrix of every marker that bending displaces: f = u . bending u
     # Data of every body's mass points: Nx, Ny and N2' of all points by coordinate; weights of all points by Gauss
     # point; x, mass and moment of inertia.
-    places: NDArray[np.float64]
-    spans: NDArray[np.float64]
-    inertias: NDArray[np.float64]
+    places: Array
+    spans: Array
+    inertias: Array
     total_mass: float
     size: float  # size of the mechanism [m], a power of two, see `dynamics.scale`
-    gravity: NDArray[np.float64]  # (2,) gravity in the ground frame [m/s^2]
+    gravity: Array  # (2,) gravity in the ground frame [m/s^2]
 
 
 @by_reference
 class Signals(NamedTuple):
     """Time profiles as piecewise quintics: motor torques first, then loads, then prescribed values."""
 
-    start: NDArray[np.int64]  # first break of each signal, then the number of all breaks
-    breaks: NDArray[np.float64]
-    coefficients: NDArray[np.float64]  # (breaks, 6), ascending powers of t - break; a signal's last piece is unused
+    start: Indices  # first break of each signal, then the number of all breaks
+    breaks: Array
+    coefficients: Array  # (breaks, 6), ascending powers of t - break; a signal's last piece is unused
 
 
 @by_reference
@@ -246,10 +244,10 @@ class Workspace(NamedTuple):
     redundant: Annotated[Floats, "m"]  # relative pivot up to which a row redundant at the start is dependent, else 0
     least: Annotated[Floats, 2]  # smallest relative pivot of the other rows, and index of its row
     # Matrices of bodies with a dense iteration matrix; None if `PackedSystem.bending` is None:
-    mass: NDArray[np.float64] | None  # M, (3 + nf)^2 entries per body
-    dense: NDArray[np.float64] | None  # Cholesky factor of M + b (K + K_g)
-    inverse: NDArray[np.float64] | None  # inverse of M + b (K + K_g), rows padded
-    geometric: NDArray[np.float64] | None  # K_g, nf^2 entries per body
+    mass: Array | None  # M, (3 + nf)^2 entries per body
+    dense: Array | None  # Cholesky factor of M + b (K + K_g)
+    inverse: Array | None  # inverse of M + b (K + K_g), rows padded
+    geometric: Array | None  # K_g, nf^2 entries per body
 
 
 def sizes_of(system: PackedSystem) -> dict[str, int]:

@@ -4,8 +4,6 @@ Numba's own list of passes is for any Python function: closures, contexts, paral
 Numba also resolves the types of every sum and product again, among dozens of candidates from strings to dates.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any

@@ -5,8 +5,6 @@ of them is loaded if the environment variable `PARAFLEX_PLAIN_NUMBA` is 1, or wi
 the variable is 0.
 """
 
-from __future__ import annotations
-
 import multiprocessing
 import os
 from collections.abc import Callable, MutableMapping

@@ -4,8 +4,6 @@ The metric is M + b K, the mass matrix and the stiffness as seen by a step of g^
 1997). With the mass matrix alone a correction would excite the stiffest modes.
 """
 
-from __future__ import annotations
-
 from paraflex.kernel.arrays import add, fill
 from paraflex.kernel.compiling import routine
 from paraflex.kernel.constraints import constraint_values

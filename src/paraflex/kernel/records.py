@@ -5,8 +5,6 @@ with `@by_reference` are split only once, where Python calls a kernel. Kernels r
 tuples.
 """
 
-from __future__ import annotations
-
 from typing import TypeVar
 
 from llvmlite import ir

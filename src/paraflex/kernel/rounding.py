@@ -1,7 +1,5 @@
 """Steps of a run solved again to rounding, as the base of derivatives."""
 
-from __future__ import annotations
-
 from typing import Annotated, NamedTuple
 
 from paraflex.kernel import indices as at, samples

@@ -1,12 +1,8 @@
 """Data of a run for the time loop: scheme, settings, state between calls, samples."""
 
-from __future__ import annotations
-
 from typing import Annotated, NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
+from paraflex.arrays import Array, Indices, Mask
 from paraflex.kernel.arrays import Floats, Ints, allocated
 from paraflex.kernel.compiling import by_reference
 
@@ -29,13 +25,13 @@ class Tableau(NamedTuple):
     A scheme of the Newmark family has A and c of the trapezoidal rule, by which energy is integrated.
     """
 
-    A: NDArray[np.float64]
-    c: NDArray[np.float64]
-    error: NDArray[np.float64]  # b - b^ of the embedded formula; empty if the error is estimated from the last step
-    dense: NDArray[np.int64]  # stages accurate enough to interpolate between, first and last among them
-    nodes: NDArray[np.int64]  # stages through which multipliers are interpolated, ascending in time
+    A: Array
+    c: Array
+    error: Array  # b - b^ of the embedded formula; empty if the error is estimated from the last step
+    dense: Indices  # stages accurate enough to interpolate between, first and last among them
+    nodes: Indices  # stages through which multipliers are interpolated, ascending in time
     order: int  # order of the error estimate
-    newmark: NDArray[np.float64]  # alpha_m, alpha_f, beta, gamma, theta; empty for ESDIRK
+    newmark: Array  # alpha_m, alpha_f, beta, gamma, theta; empty for ESDIRK
 
 
 @by_reference
@@ -63,9 +59,9 @@ class Controls(NamedTuple):
     fixed_step: float  # zero if the step size is controlled by the error
     near_error: float  # error allowed in a step near a singular position [m], if that is larger
     dependent_rows: int
-    turning: NDArray[np.int64]  # coordinates that are angles of bodies whose orientation matters
-    limit_t: NDArray[np.float64]  # times from which on the inputs limit the step size, ascending
-    limit_h: NDArray[np.float64]  # largest step size from each of these times to the next
+    turning: Indices  # coordinates that are angles of bodies whose orientation matters
+    limit_t: Array  # times from which on the inputs limit the step size, ascending
+    limit_h: Array  # largest step size from each of these times to the next
     turn_in_step: float  # largest rotation of these bodies within a step [rad]
     dependent_part: float  # relative pivot below which a row is dependent
 
@@ -104,9 +100,9 @@ class March(NamedTuple):
 class Samples(NamedTuple):
     """Dense output: requested times and the solution there."""
 
-    times: NDArray[np.float64]
-    stored: NDArray[np.bool_]  # (times,) whether a sample is kept; others serve to find the largest loads
-    solved: NDArray[np.bool_]  # (times,) whether the equations of motion were solved, instead of interpolation
+    times: Array
+    stored: Mask  # (times,) whether a sample is kept; others serve to find the largest loads
+    solved: Mask  # (times,) whether the equations of motion were solved, instead of interpolation
     q: Annotated[Floats, "times", "n"]
     v: Annotated[Floats, "times", "n"]
     a: Annotated[Floats, "times", "n"]

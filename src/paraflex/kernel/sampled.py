@@ -7,8 +7,6 @@ With readings y, quantised and filtered, errors e = y - r_k and states x the law
 or a compiled function computes w from the errors and updates x. Torques g of sample k act (whole + part) periods later.
 """
 
-from __future__ import annotations
-
 from math import cos, inf, isfinite, sin
 from typing import Annotated, Any, NamedTuple
 

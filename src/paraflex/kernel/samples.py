@@ -1,7 +1,5 @@
 """Samples within a step: positions and velocities between its stages, and the equations of motion solved there."""
 
-from __future__ import annotations
-
 from math import isfinite
 
 import numpy as np

@@ -12,8 +12,6 @@ system, in signals and weights, so a central difference over four points is exac
 solved with the iteration matrix of a run, rotated to the pose of each stage, until only rounding remains.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from paraflex.kernel import rounding

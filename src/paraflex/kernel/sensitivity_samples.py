@@ -1,12 +1,8 @@
 """Derivatives of a run at its samples within a step, before the equations of motion are solved there."""
 
-from __future__ import annotations
-
 from typing import Annotated, NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
+from paraflex.arrays import Array
 from paraflex.kernel.arrays import Floats, Ints, fill
 from paraflex.kernel.compiling import by_reference, inlined, routine
 from paraflex.kernel.samples import differentiate_nodes, interpolate, node_slope, node_value, work_weight
@@ -36,8 +32,8 @@ class Sensitivity(NamedTuple):
     work: Annotated[Floats, 2]  # work so far and its derivative
     taken: Annotated[Ints, 1]  # number of samples so far
     left: Annotated[Floats, "steps"]  # largest last relative correction, as in `History`
-    times: NDArray[np.float64]  # (times,) sample times
-    sample_times: NDArray[np.float64]  # (times,) derivatives of the sample times
+    times: Array  # (times,) sample times
+    sample_times: Array  # (times,) derivatives of the sample times
     sample_q: Annotated[Floats, "times", "n"]
     sample_v: Annotated[Floats, "times", "n"]
     sample_a: Annotated[Floats, "times", "n"]

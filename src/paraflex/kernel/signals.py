@@ -1,7 +1,5 @@
 """Time profiles as piecewise quintics, evaluated exactly with their derivatives."""
 
-from __future__ import annotations
-
 from paraflex.kernel.arrays import last_before
 from paraflex.kernel.compiling import inlined, kernel
 

@@ -12,8 +12,6 @@ constraint row is divided by w_a + w_v g + w_q b, which makes the matrix symmetr
 size.
 """
 
-from __future__ import annotations
-
 from math import isfinite
 
 from paraflex.kernel import joints

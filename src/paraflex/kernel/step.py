@@ -5,8 +5,6 @@ q_i = q_n + h sum_j A_ij v_j and v_i = v_n + h sum_j A_ij a_j, which include its
 the first of the next step. The Newmark family takes its only stage from `kernel.newmark`.
 """
 
-from __future__ import annotations
-
 from math import isfinite
 
 from paraflex.kernel import indices as at, near

@@ -6,8 +6,6 @@ factor columns[j, k]: all forces on a body are first collected as *shares*, one 
 coordinates in a second pass.
 """
 
-from __future__ import annotations
-
 from math import cos, sin
 
 from paraflex.kernel.compiling import inlined

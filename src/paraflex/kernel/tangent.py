@@ -6,14 +6,10 @@ the residuals: points of bodies, forces at them, axes, lines. The prefix `d` of 
 direction.
 """
 
-from __future__ import annotations
-
 from math import cosh, sqrt
 from typing import Annotated, NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
+from paraflex.arrays import Array
 from paraflex.kernel.arrays import Floats, allocated, apart, fill
 from paraflex.kernel.compiling import by_reference, inlined, kernel, routine
 from paraflex.kernel.constraints import joint_rates
@@ -35,7 +31,7 @@ class Tangent(NamedTuple):
     f: Annotated[Floats, "n"]  # change of the residual of the equations of motion
     rows: Annotated[Floats, "m"]  # change of the residual of the rows
     friction: Annotated[Floats, "m"]  # slope of the rows of friction against the rate, at the last `note_slopes`
-    points: NDArray[np.float64] | None  # (8, max mass points of a body) scratch of second-order geometry
+    points: Array | None  # (8, max mass points of a body) scratch of second-order geometry
 
 
 def make_tangent(system: PackedSystem) -> Tangent:

@@ -1,7 +1,5 @@
 """Changes of joints along a line and of their forces along a direction: see `kernel.tangent`."""
 
-from __future__ import annotations
-
 from math import cos, sin
 
 from paraflex.kernel.axes import axis_frame, component, line_turn, track_deflection, track_piece, track_row

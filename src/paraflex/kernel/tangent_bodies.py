@@ -1,7 +1,5 @@
 """Changes of the terms of one body along a direction, for both geometries: see `kernel.tangent`."""
 
-from __future__ import annotations
-
 from paraflex.kernel.compiling import inlined, routine
 from paraflex.kernel.packed import DAMPING, GJ, I1, OMEGA2, S2X, S2Y
 from paraflex.kernel.tangent_points import rotated_tangent, turned_axes

@@ -1,7 +1,5 @@
 """Columns of the tangent matrices of the equations of motion, computed together for bodies that are not connected."""
 
-from __future__ import annotations
-
 from paraflex.kernel.arrays import copy, fill
 from paraflex.kernel.compiling import kernel
 from paraflex.kernel.tangent import residual_tangent

@@ -1,7 +1,5 @@
 """Changes of points of bodies and of forces at them along a direction: see `kernel.tangent`."""
 
-from __future__ import annotations
-
 from math import cos, sin
 
 from paraflex.kernel.compiling import inlined, routine

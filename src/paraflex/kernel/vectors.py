@@ -5,8 +5,6 @@ units are in use. Arrays for such loops are therefore one-dimensional, laid out 
 zeros, and are processed by these functions, which become single instructions of the width that the machine has.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 from llvmlite import ir

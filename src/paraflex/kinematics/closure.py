@@ -1,7 +1,5 @@
 """Inverse kinematics along a path: Newton's iteration on the constraints, starting from a named assembly."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import dataclass, replace
@@ -178,7 +176,7 @@ def path_follower(
     *,
     assembly: str | Assembly | None = None,
     orientation: float = 0.0,
-) -> PathFollower:
+) -> "PathFollower":
     """Prepare `follow_path` for several sets of times.
 
     Parameters
@@ -220,7 +218,7 @@ class PathFollower:
         Path of the end-effector.
     """
 
-    closure: PathClosure
+    closure: "PathClosure"
     assembled: Array
     path: Path
 
@@ -231,7 +229,7 @@ class PathFollower:
         pose = self.closure.approach(self.path, self.assembled, times[0], times[-1])
         return self.closure.walk(self.path, pose, grid, keep)
 
-    def along(self, path: Path) -> PathFollower:
+    def along(self, path: Path) -> "PathFollower":
         """Return the follower of another path, in the same assembly and orientation."""
         return replace(self, path=path)
 

@@ -1,7 +1,5 @@
 """Base class of models, which functions accept in place of a mechanism: a mechanism, and paths by name."""
 
-from __future__ import annotations
-
 from typing import Protocol
 
 from paraflex.kinematics.paths import Path

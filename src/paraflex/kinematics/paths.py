@@ -1,7 +1,5 @@
 """Paths of the end-effector in the plane, with their motion profiles."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, fields
 from functools import cached_property
@@ -373,7 +371,7 @@ class TabulatedPath(CheckedFields):
         return _resting(times - times[0], np.array(self.points))
 
     @cached_property
-    def _curve(self) -> _Curve:
+    def _curve(self) -> "_Curve":
         if any(isinstance(value, complex) for point in self.points for value in point):
             raise InputError("no derivative by a point of a path", field="points", remedy="leave it out")
         return _Curve(np.array(self.points))

@@ -1,7 +1,5 @@
 """Motion profiles along a length: modified trapezoidal (Eqs. 62-63, as corrected), and with limited speed."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from math import pi, sqrt
 

@@ -1,7 +1,5 @@
 """Distances of end-effector positions from the workspace: the nearest pose to each."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -98,7 +96,7 @@ class Shortfall:
         ]
         return " and ".join(filter(None, parts))
 
-    def joined(self, more: Shortfall) -> Shortfall:
+    def joined(self, more: "Shortfall") -> "Shortfall":
         """Merge two sets of instants in order of time."""
         order = np.argsort(np.concatenate([self.t, more.t]), kind="stable")
         names = ("t", "desired", "distance", "turn", "own")

@@ -1,7 +1,5 @@
 """Derivatives of the motion along a path by parameters, from the differentiated equations of closed loops."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import NamedTuple
 

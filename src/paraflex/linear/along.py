@@ -1,7 +1,5 @@
 """Linear models at rest at poses along a motion, in common minimal coordinates."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Balanced truncation (Moore 1981) of the stable part of a linear system; the remaining part is retained."""
 
-from __future__ import annotations
-
 import numpy as np
 import scipy
 

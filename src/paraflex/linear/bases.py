@@ -5,8 +5,6 @@ of static shapes and the remainder of the lowest modes with a free interface (Ru
 these modes alone.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import NamedTuple
 

@@ -1,7 +1,5 @@
 """Branches of poles along a motion, tracked by the similarity of their shapes."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Linearisation of mechanisms at poses, along planned motions and along runs."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -219,7 +217,7 @@ def linear_model(
 def charted(
     source: TrackingTask | TrackingRun | MotionRun, mode: str | ActuationMode | None, forces: Sequence[str],
     prescribed: Sequence[str], coordinates: FirstCoordinates | str,
-) -> tuple[OperatingPoints, Chart]:  # fmt: skip
+) -> "tuple[OperatingPoints, Chart]":  # fmt: skip
     """Return a motion, and the chart of linear models along it."""
     task = source.task if isinstance(source, TrackingRun) else source
     mechanism = task.system.mechanism if isinstance(task, MotionRun) else task.mechanism

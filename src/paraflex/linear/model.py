@@ -1,7 +1,5 @@
 """Linear models of mechanisms: state space, poles, zeros and frequency responses."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property, partial
@@ -357,7 +355,7 @@ class LinearModel(NamedModel):
     # --- Other forms of the model -------------------------------------------------------------------------------------
 
     @checked_arguments()
-    def select(self, inputs: Sequence[str] | None = None, outputs: Sequence[str] | None = None) -> LinearModel:
+    def select(self, inputs: Sequence[str] | None = None, outputs: Sequence[str] | None = None) -> "LinearModel":
         """Return the model with the named inputs and outputs, in the order given; by default all."""
         chosen = [numbers_of(named, have, what) for named, have, what in
                   ((inputs, self.inputs, "input"), (outputs, self.outputs, "output"))]  # fmt: skip

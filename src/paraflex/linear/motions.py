@@ -1,7 +1,5 @@
 """Free motions of linear models: undamped modes and poles, optionally with motors held."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np
@@ -47,7 +45,7 @@ class SecondOrder(NamedTuple):
     typical: float
     vibrating: bool
 
-    def within(self, basis: Array) -> SecondOrder:
+    def within(self, basis: Array) -> "SecondOrder":
         """Project the equations on a subspace with coordinates z, y = basis z, with a basis (f, k)."""
         mass, damping, stiffness = (basis.T @ part @ basis for part in self[:3])
         return SecondOrder(mass, damping, stiffness, self.typical, self.vibrating)

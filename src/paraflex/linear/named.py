@@ -8,10 +8,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import scipy
-from numpy.typing import ArrayLike
 
 from paraflex.arguments import checked_arguments, numbers_in
-from paraflex.arrays import Array, Complex, Indices
+from paraflex.arrays import Array, ArrayLike, Complex, Indices
 from paraflex.errors import InputError, optional_package
 from paraflex.linear.coordinates import Variable
 from paraflex.mechanism.quantities import all_listed, finite

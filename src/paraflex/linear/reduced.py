@@ -1,7 +1,5 @@
 """Reduced-order linear models, the results of `reduction`."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from enum import Enum
@@ -9,10 +7,9 @@ from typing import Any
 
 import numpy as np
 import scipy
-from numpy.typing import ArrayLike
 
 from paraflex.arguments import checked_arguments
-from paraflex.arrays import Array, Complex
+from paraflex.arrays import Array, ArrayLike, Complex
 from paraflex.dynamics.state_space import StateSpace
 from paraflex.errors import InputError
 from paraflex.linear.bases import kernel

@@ -1,7 +1,5 @@
 """Reduction of linear models: modal bases of this or other poses, interpolated bases, and balanced truncation."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any

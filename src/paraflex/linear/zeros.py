@@ -10,8 +10,6 @@ twice by systems of random combinations of as many inputs and outputs as the ran
 all inputs and outputs loses rank is a zero of the system.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import NamedTuple
 

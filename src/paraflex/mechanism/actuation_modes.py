@@ -1,7 +1,5 @@
 """Actuation modes, looked up by their names, signs or motors."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 from paraflex.arguments import checked_arguments

@@ -1,7 +1,5 @@
 """Electric motors with their gears and amplifiers."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import dataclass
 from enum import Enum

@@ -1,7 +1,5 @@
 """Rigid bodies, flexible beams and bars of assumed modes, with named points in the body frame."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 from enum import Enum

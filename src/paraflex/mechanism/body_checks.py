@@ -1,7 +1,5 @@
 """Checks of a body: plausible numbers, points on the body, shapes that can be integrated."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from typing import TypeVar
 

@@ -1,7 +1,5 @@
 """Structural checks of a mechanism. A mechanism that passes all of them can be assembled into a system."""
 
-from __future__ import annotations
-
 from collections import Counter
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Link from a mechanism derived for computation, with divided beams or added members, to the one described."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property

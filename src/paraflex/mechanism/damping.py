@@ -1,7 +1,5 @@
 """Structural damping of a flexible body: modal damping ratios, Rayleigh coefficients, or a loss factor."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 
 import numpy as np

@@ -3,8 +3,6 @@
 Deflections are relative to each frame, so slopes remain small when the whole beam has large deflections.
 """
 
-from __future__ import annotations
-
 from bisect import bisect_right
 from collections.abc import Mapping, Sequence
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """Gears and other linear relations between joint coordinates."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 

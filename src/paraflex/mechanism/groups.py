@@ -1,7 +1,5 @@
 """Groups of members of a mechanism, each described once, in `Members`."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass, field, fields
 from functools import cache

@@ -6,8 +6,6 @@ about point b, positive anticlockwise (`dynamics.joint_loads`). A positive torqu
 such that the coordinate increases.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field, fields
 from enum import Enum
 from typing import Any, ClassVar
@@ -31,7 +29,7 @@ class PointRef(CheckedFields):
     point: str
 
     @classmethod
-    def taken_from(cls, given: object, field: str) -> PointRef | None:
+    def taken_from(cls, given: object, field: str) -> "PointRef | None":
         """Return the point of "body.point" or of the two names; None for anything else."""
         if isinstance(given, str):
             return cls.parse(given, str(field))
@@ -41,7 +39,7 @@ class PointRef(CheckedFields):
 
     @classmethod
     @checked_arguments()
-    def parse(cls, text: str, field: str = "point") -> PointRef:
+    def parse(cls, text: str, field: str = "point") -> "PointRef":
         """Parse "body.point".
 
         Raises
@@ -83,7 +81,7 @@ class AtEnd(Enum):
 
 
 # Kinds of joints by their names in files.
-JOINT_KINDS: dict[str, type[Joint]] = {}
+JOINT_KINDS: "dict[str, type[Joint]]" = {}
 _SYMBOLS = {("points",): "pin", ("points", "angle"): "weld", ("axis", "angle"): "slider", ("axis",): "slot"}
 
 

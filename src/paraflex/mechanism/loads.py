@@ -1,7 +1,5 @@
 """Forces on a mechanism other than those of motors: springs, dampers, friction, applied forces and torques."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from typing import ClassVar
 

@@ -1,7 +1,5 @@
 """Closed loops of a mechanism, each a closed chain of joints."""
 
-from __future__ import annotations
-
 from collections import deque
 
 from paraflex.mechanism.joints import GROUND

@@ -1,7 +1,5 @@
 """Default measurements of a mechanism: encoders of the motors and the position of the end-effector."""
 
-from __future__ import annotations
-
 from collections.abc import Container
 
 from paraflex.mechanism.mechanism import Mechanism

@@ -1,7 +1,5 @@
 """Mechanism: its members, checked on construction, and variants with other bodies."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -102,7 +100,7 @@ class Mechanism(Members, Shown):
         save_file(self, path)
 
     @classmethod
-    def from_source(cls, given: object) -> Mechanism:
+    def from_source(cls, given: object) -> "Mechanism":
         """Return the mechanism of a model, or the given mechanism.
 
         Raises
@@ -116,13 +114,13 @@ class Mechanism(Members, Shown):
         return taken
 
     @checked_arguments()
-    def with_bodies(self, bodies: Iterable[Body]) -> Mechanism:
+    def with_bodies(self, bodies: Iterable[Body]) -> "Mechanism":
         """Return the mechanism with the given bodies in place of those of the same names."""
         new = {body.name: body for body in bodies}
         return replace(self, bodies=tuple(new.get(body.name, body) for body in self.bodies))
 
     @checked_arguments()
-    def with_payload(self, payload: Payload) -> Mechanism:
+    def with_payload(self, payload: Payload) -> "Mechanism":
         """Return the mechanism with a payload at its end-effector, in addition to the mass that the body there has.
 
         A rigid body receives the combined mass, centre of mass and moment of inertia. A beam receives a lump at the
@@ -140,7 +138,7 @@ class Mechanism(Members, Shown):
         return replace(carrying, payload=together(self.payload, payload))
 
     @checked_arguments()
-    def rigid(self, names: Sequence[str] | None = None) -> Mechanism:
+    def rigid(self, names: Sequence[str] | None = None) -> "Mechanism":
         """Return the mechanism with the named bodies rigid, by default all: the RDM of Remark 3.
 
         Raises
@@ -162,7 +160,7 @@ class Mechanism(Members, Shown):
         curvature: Curvature | str | None = None,
         modes: int | None = None,
         reduction: ComponentModes | str | None = None,
-    ) -> Mechanism:
+    ) -> "Mechanism":
         """Return the mechanism with another mesh, reference condition, curvature or reduction of every flexible beam.
 
         Parameters
@@ -200,7 +198,7 @@ class Mechanism(Members, Shown):
         return changed.with_bodies(replace(body, modes=modes) for body in bodies)
 
     @checked_arguments()
-    def refined(self, factor: int) -> Mechanism:
+    def refined(self, factor: int) -> "Mechanism":
         """Return the mechanism with `factor` times as many elements on every span of its flexible beams.
 
         Raises
@@ -226,7 +224,7 @@ class Mechanism(Members, Shown):
             )
 
     @checked_arguments()
-    def with_geometry(self, geometry: Geometry | str) -> Mechanism:
+    def with_geometry(self, geometry: Geometry | str) -> "Mechanism":
         """Return the mechanism with linear or second-order geometry of its flexible beams.
 
         Raises

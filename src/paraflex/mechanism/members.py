@@ -1,7 +1,5 @@
 """Members of a mechanism, looked up by name."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import Enum
@@ -56,7 +54,7 @@ class EndEffector(CheckedFields):
         object.__setattr__(self, "coordinates", tuple(given))
 
     @classmethod
-    def taken_from(cls, given: object, field: str) -> EndEffector | None:
+    def taken_from(cls, given: object, field: str) -> "EndEffector | None":
         """Return the end-effector at a point given as "body.point"; None for anything else."""
         return cls(PointRef.parse(given, str(field))) if isinstance(given, str) else None
 

@@ -1,7 +1,5 @@
 """Flexible body given by its matrices, from a finite-element program or entered by hand."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, Self

@@ -1,7 +1,5 @@
 """Payload at the end-effector, and bodies with additional mass and moment of inertia."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any

@@ -1,7 +1,5 @@
 """Default phases of relations and lengths of distance joints, from the first assembly."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import replace
 from math import cos, dist, sin

@@ -1,7 +1,5 @@
 """Approximate poses of bodies from the angles and the point positions of an assembly, by way of the joints."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from math import atan2, cos, hypot, sin

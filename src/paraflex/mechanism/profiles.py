@@ -1,7 +1,5 @@
 """Profiles of prescribed motions, loads and torques in time: functions, constant speed, pieces and tables."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from enum import Enum

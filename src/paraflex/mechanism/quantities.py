@@ -1,7 +1,5 @@
 """Metadata of the fields of a mechanism's members, and checks of single numbers."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from dataclasses import field, fields

@@ -4,8 +4,6 @@ Two arms A_i B_i C meet at the end-effector C. Beside each arm is a branch D_i E
 the arm, so that the distal link 4 (8) can be driven from the base as well (Figs. 2, 8 and 9 of the paper).
 """
 
-from __future__ import annotations
-
 from math import pi
 
 from paraflex.arguments import checked_arguments

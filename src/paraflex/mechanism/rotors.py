@@ -1,7 +1,5 @@
 """Contributions of actuators to a mechanism: rotors as lumps at joints, back-EMF as dampers."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from paraflex.arguments import with_fields

@@ -1,7 +1,5 @@
 """Rigid mechanisms of variable size: a row of four-bar linkages and a hanging chain."""
 
-from __future__ import annotations
-
 from math import pi
 
 from paraflex.arguments import checked_arguments

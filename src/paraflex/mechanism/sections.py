@@ -1,7 +1,5 @@
 """Cross-sections of beams: area and second moment of area, given directly or by a shape."""
 
-from __future__ import annotations
-
 import math
 from abc import ABC, abstractmethod
 from dataclasses import dataclass, field
@@ -169,13 +167,13 @@ class Section(CheckedFields):
     )
 
     @classmethod
-    def of(cls, shape: Shape) -> Section:
+    def of(cls, shape: Shape) -> "Section":
         """Return the section of a shape."""
         return cls(shape.area, shape.second_moment, shape, shape.outer_fibre)
 
     @classmethod
     @checked_arguments()
-    def rectangle(cls, width: float, thickness: float, wall: float | None = None) -> Section:
+    def rectangle(cls, width: float, thickness: float, wall: float | None = None) -> "Section":
         """Return a rectangular section with a width out of the plane of motion and a thickness in it [m].
 
         A wall thickness [m] makes it hollow.
@@ -184,12 +182,12 @@ class Section(CheckedFields):
 
     @classmethod
     @checked_arguments()
-    def round(cls, diameter: float) -> Section:
+    def round(cls, diameter: float) -> "Section":
         """Return a solid circular section with a diameter [m]."""
         return cls.of(Round(diameter))
 
     @classmethod
     @checked_arguments()
-    def tube(cls, diameter: float, wall: float) -> Section:
+    def tube(cls, diameter: float, wall: float) -> "Section":
         """Return the section of a circular tube with an outer diameter and a wall thickness [m]."""
         return cls.of(Tube(diameter, wall))

@@ -1,7 +1,5 @@
 """Virtual prototype (section 6.1): a mechanism whose flexible beams are replaced by rigid segments with springs."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise

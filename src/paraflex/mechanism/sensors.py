@@ -1,7 +1,5 @@
 """Sensors: named quantities that are measured in a run and are outputs of a linear model."""
 
-from __future__ import annotations
-
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Mapping
@@ -20,7 +18,7 @@ from paraflex.mechanism.joints import GROUND, Joint, PointRef
 from paraflex.mechanism.quantities import AT_JOINT, field_metadata, finite, known, optional
 
 # Kinds of sensors by their names in files.
-SENSOR_KINDS: dict[str, type[Sensor]] = {}
+SENSOR_KINDS: "dict[str, type[Sensor]]" = {}
 
 
 def _axis(*words: str, angle: bool = True) -> Callable[[Any, str], None]:
@@ -211,7 +209,7 @@ class Sensor(CheckedFields, ABC):
             The mechanism lacks it; the message begins with `field`.
         """
 
-    def on_part(self, body: str, at: float) -> Sensor:
+    def on_part(self, body: str, at: float) -> "Sensor":
         """Return the same sensor on a part of its beam, for a section in a beam of several frames.
 
         Parameters

@@ -1,7 +1,5 @@
 """Initial state of a motion, given by names: deflections, velocities, or all coordinates of bodies."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 

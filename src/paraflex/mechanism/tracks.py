@@ -1,7 +1,5 @@
 """Beams that a joint slides along, and the mesh that such beams need."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import replace
 from math import ceil

@@ -4,8 +4,6 @@ A figure with charts is a function of `paraflex.figures`. A drawing is a functio
 kinds of results name it.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 
 from paraflex.figures.catalogue import figures_of_kind

@@ -1,7 +1,5 @@
 """Figures of charts for print: each figure of the catalogue as a plotting function, drawn by Matplotlib."""
 
-from __future__ import annotations
-
 import inspect
 from collections.abc import Callable, Mapping, Sequence
 from functools import cache

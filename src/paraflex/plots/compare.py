@@ -1,7 +1,5 @@
 """Figures that compare two runs by curves in common panels."""
 
-from __future__ import annotations
-
 from functools import partial
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Drawing of a mechanism by Matplotlib: links with true or magnified deflections, joints, ground, springs, paths."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Figures of static equilibria: deformed shapes in steps, buckling shapes."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

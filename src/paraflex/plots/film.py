@@ -1,7 +1,5 @@
 """Films of runs as MP4, GIF, a sequence of PNG files, or one animated SVG; several modes side by side."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path

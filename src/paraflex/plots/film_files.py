@@ -1,7 +1,5 @@
 """Files of films: MP4, GIF, one animated SVG, one or many PNG files; only a few pictures are in memory at a time."""
 
-from __future__ import annotations
-
 import re
 import shutil
 import subprocess

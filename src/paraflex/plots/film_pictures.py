@@ -1,7 +1,5 @@
 """Pictures of a film, drawn one after the other by Matplotlib."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
@@ -10,9 +8,8 @@ from typing import Any
 import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
-from paraflex.arrays import Array
+from paraflex.arrays import Array, NDArray
 from paraflex.plots.drawing import Sketch, bare, caption, draw_load_keys, draw_scale_bar, name_links
 from paraflex.plots.labels import plain
 from paraflex.plots.scene import Scene, common_limits

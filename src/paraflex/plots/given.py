@@ -1,7 +1,5 @@
 """Arguments of plotting functions: results of the right kind, or the folder or file that holds them."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Callable, Mapping
 from functools import wraps

@@ -1,7 +1,5 @@
 """Texts of printed figures: mathematics of symbols."""
 
-from __future__ import annotations
-
 import re
 
 from paraflex.formatting import GREEK, printable, text_symbol

@@ -4,8 +4,6 @@ Matplotlib's constrained layout measures every text several times, which takes l
 align the axis labels of a column.
 """
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Iterator, Mapping, Sequence
@@ -17,8 +15,8 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.axis import Axis
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
 
+from paraflex.arrays import NDArray
 from paraflex.figures.charts import TIME
 from paraflex.formatting import ROUNDING
 from paraflex.mechanism.quantities import known

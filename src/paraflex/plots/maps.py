@@ -1,7 +1,5 @@
 """Maps of metrics over two parameters of many designs."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import matplotlib

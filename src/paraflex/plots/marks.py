@@ -1,7 +1,5 @@
 """Symbols of a scene in metres, with their looks: supports, rails, blocks, pins, welds, springs, gears and loads."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from typing import NamedTuple
 

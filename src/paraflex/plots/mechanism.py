@@ -1,7 +1,5 @@
 """Sketch of a mechanism in one pose: links, joints, ground points and their names, from positions alone."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from itertools import pairwise
 from typing import Any

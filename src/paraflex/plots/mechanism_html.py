@@ -1,7 +1,5 @@
 """View of a mechanism in notebooks: its members and a sketch."""
 
-from __future__ import annotations
-
 import re
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Figure of the lowest undamped mode shapes of a mechanism."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Arrows of a model drawing: loads with their magnitudes, and the first movements of driven joints."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Drawing of a model before it runs: names, joints by kind, drives, loads, sensors and path."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Marks of sensors in a model drawing: their positions and the axes or angles that they measure."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any
 

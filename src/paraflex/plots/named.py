@@ -1,15 +1,12 @@
 """Placement of names in a drawing, clear of one another and of the drawn lines."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from matplotlib.axes import Axes
-from numpy.typing import NDArray
 
-from paraflex.arrays import Array
+from paraflex.arrays import Array, Indices
 from paraflex.figures.shapes import along, travelled
 
 # Widths of a regular and of a bold letter, and height of a line, in font sizes.
@@ -58,7 +55,7 @@ def place_names(axes: Axes, names: Sequence[Name], drawn: Sequence[Array], size:
         _write(axes, name, centre * per_point, name.places[of[best]] if gaps[best] >= _FAR else None, size)
 
 
-def _candidates(anchors: Array, half: Array) -> tuple[Array, Array, NDArray[np.int64]]:
+def _candidates(anchors: Array, half: Array) -> tuple[Array, Array, Indices]:
     """Return candidate centres (c, 2) around anchors (n, 2), gaps (c,) between box and anchor [pt], and anchors (c,).
 
     The anchors of the candidates are given by their indices.

@@ -1,7 +1,5 @@
 """Parallel coordinates of many designs."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import matplotlib

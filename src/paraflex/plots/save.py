@@ -1,7 +1,5 @@
 """Writing of figures: those that accompany the results of a command, and single figures for print."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any, TextIO

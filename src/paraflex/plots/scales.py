@@ -3,8 +3,6 @@
 Numbers are plain text because the layout computes their width from that of the digits.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from typing import Any, Literal

@@ -4,8 +4,6 @@ Scenes are drawn by Matplotlib (`plots/drawing.py`), as SVG (`plots/svg.py`) and
 (`report/film.py`).
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import NamedTuple
@@ -55,7 +53,7 @@ class Limits(NamedTuple):
         """Larger side [m]."""
         return max(self.right - self.left, self.top - self.bottom)
 
-    def filling(self, flattest: float, tallest: float) -> tuple[Limits, float]:
+    def filling(self, flattest: float, tallest: float) -> "tuple[Limits, float]":
         """Return the limits extended to fill a panel, and the panel's ratio of height to width.
 
         The ratio is that of the limits, clipped to the range from `flattest` to `tallest`.
@@ -63,7 +61,7 @@ class Limits(NamedTuple):
         aspect = float(np.clip((self.top - self.bottom) / (self.right - self.left), flattest, tallest))
         return self.fitted(1.0 / aspect), aspect
 
-    def fitted(self, ratio: float) -> Limits:
+    def fitted(self, ratio: float) -> "Limits":
         """Return the limits extended to a panel with this ratio of width to height."""
         width, height = self.right - self.left, self.top - self.bottom
         wide, high = max(ratio * height - width, 0.0) / 2.0, max(width / ratio - height, 0.0) / 2.0

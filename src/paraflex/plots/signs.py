@@ -1,7 +1,5 @@
 """Legend signs that look as in the drawing, and arrows."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple

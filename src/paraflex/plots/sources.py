@@ -1,7 +1,5 @@
 """Recognition of results on disk by their content: kind of results, and data for figures."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any

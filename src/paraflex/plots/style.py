@@ -1,7 +1,5 @@
 """Style of every figure: fonts, and lines that are distinguishable in black and white."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any

@@ -1,16 +1,13 @@
 """Scenes as SVG elements: still, or animated in browsers by lists of values over time (SMIL)."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from html import escape
 from types import EllipsisType
 
 import numpy as np
-from numpy.typing import NDArray
 
-from paraflex.arrays import Array
+from paraflex.arrays import Array, Indices
 from paraflex.figures.shapes import figure_of, travelled
 from paraflex.formatting import printable
 from paraflex.mechanism import Mechanism
@@ -52,7 +49,7 @@ class Pen:
     unit: float
     look: Theme
     seconds: float = 0.0
-    keys: NDArray[np.int64] | EllipsisType = ...
+    keys: Indices | EllipsisType = ...
 
     def pixels(self, places: Array) -> Array:
         """Return positions (f, ..., 2) [m] as positions on the page at the shown times [pixels]."""

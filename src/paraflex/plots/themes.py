@@ -1,7 +1,5 @@
 """Colours of drawings, films and reports on light and on dark backgrounds."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from paraflex.mechanism.quantities import known

@@ -1,7 +1,5 @@
 """Figure of the desired path of the end-effector in the workspace (Fig. 11)."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -14,8 +14,6 @@ K x / x^T M x: load-dependent Ritz vectors (Wilson, Yuan and Dickens 1982, Earth
 which tend to the lowest modes that the forces excite.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 
 import numpy as np

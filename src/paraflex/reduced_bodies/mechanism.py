@@ -5,8 +5,6 @@ singular value decomposition of omega u over all deflections gives directions an
 orthogonal decomposition). The directions with the largest shares are kept, over all bodies together.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import NamedTuple

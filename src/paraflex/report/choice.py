@@ -1,14 +1,12 @@
 """Choice of the runs of a study that a report shows in motion, and of those that it draws in charts."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from itertools import combinations
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from paraflex.arrays import NDArray
 from paraflex.figures.designs import DesignTable, column_label, fronts, in_conflict, undominated
 
 # Largest number of rows drawn and of runs in motion, and number of the latter that are on the front.

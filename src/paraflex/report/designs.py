@@ -1,14 +1,12 @@
 """Charts of all designs of a study, which the reader chooses columns of, and the runs that they show."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from paraflex.arrays import NDArray
 from paraflex.figures.charts import Axis, Chart, Panel, is_logarithmic, look
 from paraflex.figures.designs import DesignTable, in_conflict
 from paraflex.formatting import count, superscripts

@@ -1,7 +1,5 @@
 """Animation of a page: scenes of all its runs for the player, in at most `MOST_FRAMES` frames."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import product
@@ -9,9 +7,8 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
-from paraflex.arrays import Array
+from paraflex.arrays import Array, NDArray
 from paraflex.errors import InputError
 from paraflex.figures.shapes import figure_of
 from paraflex.plots.marks import DOT, LOOKS, Mark, key_arrow, moving_marks, still_marks

@@ -3,8 +3,6 @@
 Reports of single kinds add to it what only they have.
 """
 
-from __future__ import annotations
-
 from importlib import import_module
 
 import xarray as xr

@@ -1,7 +1,5 @@
 """Report of linear models: animated mode shapes, gains, poles and zeros."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """Tables and tiles of loads and controllers in the report of a run."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 

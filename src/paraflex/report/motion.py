@@ -1,7 +1,5 @@
 """Report of a run without a path."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import replace
 

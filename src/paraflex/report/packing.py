@@ -1,14 +1,13 @@
 """Compressed numbers for a page, including NaN, which JSON does not have."""
 
-from __future__ import annotations
-
 import base64
 import zlib
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+
+from paraflex.arrays import ArrayLike, NDArray
 
 # 16-bit integers: the code of NaN, and the largest magnitude of other values.
 MISSING, _LARGEST_CODE = -32768, 32767

@@ -1,7 +1,5 @@
 """HTML page of every report: one file with its style, its scripts, Plotly and the numbers."""
 
-from __future__ import annotations
-
 import json
 import re
 from collections.abc import Mapping, Sequence
@@ -16,9 +14,9 @@ from string import Template
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from paraflex.arguments import checked_arguments, named_in_errors
+from paraflex.arrays import ArrayLike
 from paraflex.errors import InputError
 from paraflex.figures.charts import (
     Array,

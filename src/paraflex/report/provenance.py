@@ -1,7 +1,5 @@
 """Provenance of results: facts of a run, and the command that repeats it."""
 
-from __future__ import annotations
-
 import json
 import shlex
 from collections.abc import Collection, Mapping, Sequence

@@ -1,7 +1,5 @@
 """Report of reduced linear models: states needed, and errors and responses beside those of the full model."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import xarray as xr

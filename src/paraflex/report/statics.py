@@ -1,7 +1,5 @@
 """Report of static equilibria: animation of the steps, force and stiffness along the travel, buckling, stresses."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any

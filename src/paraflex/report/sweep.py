@@ -1,7 +1,5 @@
 """Report of a study of many designs: its parameters, its results, and the best designs in motion."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -9,8 +7,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
+from paraflex.arrays import NDArray
 from paraflex.figures import search
 from paraflex.figures.catalogue import page_panels
 from paraflex.figures.charts import Panel

@@ -1,7 +1,5 @@
 """Numbers and tables of a page as text and HTML."""
 
-from __future__ import annotations
-
 import json
 import math
 import re

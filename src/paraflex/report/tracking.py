@@ -1,16 +1,14 @@
 """Report of a tracking study: comparison of all actuation modes, and details of each mode."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
 from paraflex.arguments import checked_arguments
+from paraflex.arrays import Mask
 from paraflex.figures.reduction import reduced_runs
 from paraflex.figures.run_motion import deflections_of, effort_axis
 from paraflex.figures.run_tables import Runs, after_table, result_table, solver_table
@@ -107,7 +105,7 @@ def _figures(data: xr.Dataset) -> list[tuple[str, str, str]]:
     return [*tiles, *load_tiles({name: load_figures(data.sel(mode=name)) for name in names_of(data, "mode")})]
 
 
-def _broken_off(data: xr.Dataset, whole: NDArray[np.bool_]) -> tuple[str, str, str]:
+def _broken_off(data: xr.Dataset, whole: Mask) -> tuple[str, str, str]:
     """Return the tile of incomplete runs: their number and the times at which they ended."""
     first = np.flatnonzero(~whole)
     ends = [float(data["time"].values[max(samples(data.isel(mode=r)) - 1, 0)]) for r in first]

@@ -1,7 +1,5 @@
 """Report of a verification: all models of one mechanism in common charts, and their distances."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path

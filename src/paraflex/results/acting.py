@@ -1,7 +1,5 @@
 """Loads over the duration of a study: onset and size of each load, and directions of the first joint movements."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 

@@ -1,14 +1,11 @@
 """Stresses in the sections of beams of a run, from its dataset, and the largest of them."""
 
-from __future__ import annotations
-
 from typing import Any, NamedTuple
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
-from paraflex.arrays import Array
+from paraflex.arrays import Array, NDArray
 from paraflex.results.loads import OF_BEAMS
 from paraflex.results.numbers import largest
 

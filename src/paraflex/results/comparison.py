@@ -1,7 +1,5 @@
 """Comparison of two runs: differences of their metrics, settings and motions."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field

@@ -1,7 +1,5 @@
 """Labelled dataset of a tracking study: the runs of all modes with dimensions, units and provenance."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator, Sequence
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Geometry of drawings of a mechanism: stations of all bodies, joints and springs over time, from any model."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from itertools import pairwise

@@ -12,9 +12,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
 from paraflex.arguments import checked_arguments
+from paraflex.arrays import NDArray
 from paraflex.errors import InputError, suggestion
 from paraflex.folders import RESULT_KINDS, added_to
 from paraflex.results.beam_stresses import SECTION

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
+from paraflex.arrays import Mask
 from paraflex.findings import DONE_STATUSES, Finding, Level, Verdict
 
 if TYPE_CHECKING:
@@ -35,7 +35,7 @@ VALIDITY_UNITS = {
 }
 
 
-def finished(data: xr.Dataset) -> NDArray[np.bool_]:
+def finished(data: xr.Dataset) -> Mask:
     """Return which runs of a dataset reached their end or an event; metrics of the others cover a part of the run."""
     return np.isin(np.atleast_1d(data["status"].values), DONE_STATUSES)
 

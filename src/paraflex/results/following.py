@@ -1,7 +1,5 @@
 """Tracking metrics of the runs of a dataset, the metric that ranks runs, and the part of a path that was covered."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from enum import Enum

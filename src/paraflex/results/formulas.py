@@ -1,13 +1,10 @@
 """Formulas of metrics; those that need derivatives use sums, products and roots only, for the complex step."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from paraflex.arrays import Numbers
+from paraflex.arrays import Mask, Numbers
 
 # A sample within this fraction of the motion from its end is at the end: rounding of times.
 SAME_TIME = 1e-9
@@ -21,7 +18,7 @@ SETTLING_BAND = 0.05
 _NEAR_END = 1e-6
 
 
-def during_motion(t: Numbers, motion_end: float) -> NDArray[np.bool_]:
+def during_motion(t: Numbers, motion_end: float) -> Mask:
     """Return which samples at times t (k,) [s] are during the motion, its end included; the others are after it."""
     end = np.real(motion_end)
     return np.real(t) <= end + SAME_TIME * abs(end)
@@ -99,7 +96,7 @@ def settling_time(t: Numbers, distance: Numbers, motion_end: float, band: float 
     return max(float(times[last] + part * (times[last + 1] - times[last])) - motion_end, 0.0)
 
 
-def overshoot(position: Numbers, desired: Numbers, moving: NDArray[np.bool_]) -> float:
+def overshoot(position: Numbers, desired: Numbers, moving: Mask) -> float:
     """Return the overshoot [m] of positions (k, 2) beyond the end of their desired path (k, 2), in its final direction.
 
     Only samples after the motion count, which are those where `moving` (k,) is false. The value is 0 without overshoot,

@@ -1,7 +1,5 @@
 """HTML views of runs in notebooks: status, results, and counts of the solver."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Kinds of datasets of results, and the error for a dataset of a wrong kind."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 
 import xarray as xr

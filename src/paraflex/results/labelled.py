@@ -1,15 +1,13 @@
 """Common parts of datasets of runs: variables of the links, labels, units, sign conventions, provenance."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from importlib.metadata import version
 from typing import Any
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
+from paraflex.arrays import NDArray
 from paraflex.dynamics import System
 from paraflex.integrators import IntegrationOptions
 from paraflex.mechanism import Mechanism

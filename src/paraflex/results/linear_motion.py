@@ -1,7 +1,5 @@
 """Undamped modes of linear models, converted to motions that can be drawn."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from typing import NamedTuple
 

@@ -1,7 +1,5 @@
 """Summaries of linear models as plain numbers and in words: poles, zeros, and those in the right half-plane."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Iterator, Sequence
 from typing import Any, NamedTuple

@@ -1,14 +1,11 @@
 """Motion and loads of bodies, points, joints and motors at the samples of a run."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from paraflex.arrays import Array
+from paraflex.arrays import Array, NDArray
 from paraflex.dynamics import Marker, System, end_markers, joint_coordinate, material_angle, sensor_readings
 from paraflex.dynamics.joint_loads import (
     LoadComponents,

@@ -1,14 +1,12 @@
 """Largest loads of a run as plain numbers: stresses, joint motion and forces, efforts of motors and drives."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
+from paraflex.arrays import Mask
 from paraflex.findings import RESOLVED
 from paraflex.formatting import display_unit, error_text, number, quantity, speed_text
 from paraflex.results.numbers import finite_or_none, largest, units_of_each
@@ -76,7 +74,7 @@ def load_figures(run: xr.Dataset) -> dict[str, Any]:
     return out
 
 
-def sliding_joints(data: xr.Dataset) -> NDArray[np.bool_]:
+def sliding_joints(data: xr.Dataset) -> Mask:
     """Return which joints (joints,) have a travel [m] instead of an angle [rad]."""
     known = np.isfinite(data["joint_direction"].transpose(..., "joint").values)
     return np.asarray(known.reshape(-1, known.shape[-1]).any(axis=0))

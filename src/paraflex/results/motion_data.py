@@ -1,7 +1,5 @@
 """Labelled dataset of a run without a path: coordinates, points, joint forces, energies."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Iterable
 from typing import Any

@@ -1,15 +1,12 @@
 """Stations of bodies for drawings, their motion, and their positions on undeformed bodies."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
-from paraflex.arrays import Array, Complex, Numbers
+from paraflex.arrays import Array, Complex, Indices, Numbers
 from paraflex.dynamics import BodyCoordinates, System, across_chord
 from paraflex.fem import slope_squares
 from paraflex.mechanism import (
@@ -313,7 +310,7 @@ def _distinct(places: Array) -> Array:
     return np.array(kept).reshape(-1, 2)
 
 
-def figure_order(places: Array) -> NDArray[np.int64]:
+def figure_order(places: Array) -> Indices:
     """Return the order of places for drawing: along their line, or around their closed hull, then those inside."""
     z = places[:, 0] + 1j * places[:, 1]
     if len(z) < 3:

@@ -1,7 +1,5 @@
 """Initial pose of a mechanism, drawn before a run."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 

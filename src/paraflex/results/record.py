@@ -1,7 +1,5 @@
 """Record of a run link by link, in a form that every model of a mechanism can provide."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any

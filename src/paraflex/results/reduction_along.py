@@ -1,14 +1,11 @@
 """Errors along a path of reduced models whose basis is that of one pose, or interpolated between several poses."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
-from paraflex.arrays import Array, Complex
+from paraflex.arrays import Array, Complex, Indices, NDArray
 from paraflex.errors import InputError
 from paraflex.linear.along import PosesAlong
 from paraflex.linear.model import LinearModel
@@ -88,7 +85,7 @@ def along_variables(
     return variables, {"static": list(STATIC), "basis": list(found), "place": places}
 
 
-def _bases(places: Array, *, closed: bool) -> Iterator[tuple[str, Take]]:
+def _bases(places: Array, *, closed: bool) -> "Iterator[tuple[str, Take]]":
     """Yield names of bases, and functions that return the reduced models of a path with them.
 
     The functions take the path and whether static shapes are renewed.
@@ -99,7 +96,7 @@ def _bases(places: Array, *, closed: bool) -> Iterator[tuple[str, Take]]:
         parts = np.interp(places, places[chosen], np.arange(count)).tolist()
 
         def between(
-            path: _Path, renewed: bool, chosen: NDArray[np.int64] = chosen, parts: list[float] = parts
+            path: _Path, renewed: bool, chosen: Indices = chosen, parts: list[float] = parts
         ) -> list[ReducedModel]:
             some = [path.own[k] for k in chosen]
             return [reduce(model, basis=some, part=part, renewed=renewed)

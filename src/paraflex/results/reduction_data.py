@@ -1,16 +1,13 @@
 """Labelled dataset of reduced linear models: states needed, frequencies, gains and errors relative to full models."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
 from paraflex.arguments import checked_arguments
-from paraflex.arrays import Array
+from paraflex.arrays import Array, Indices
 from paraflex.errors import InputError
 from paraflex.linear.along import PosesAlong
 from paraflex.linear.model import LinearModel
@@ -166,7 +163,7 @@ def _frequencies(models: Sequence[LinearModel], few: Sequence[Sequence[ReducedMo
     return out
 
 
-def _held(models: Sequence[LinearModel], names: Sequence[str], counts: NDArray[np.int64]) -> Array:
+def _held(models: Sequence[LinearModel], names: Sequence[str], counts: Indices) -> Array:
     """Return the lowest frequency above zero with motors held (mode, reduction, count) [Hz], NaN without one."""
 
     def lowest(model: LinearModel, states: int, name: str) -> float:

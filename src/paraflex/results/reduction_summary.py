@@ -1,7 +1,5 @@
 """Summaries of reduced linear models as plain numbers, and the names that their datasets use."""
 
-from __future__ import annotations
-
 import json
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Readings of sensors in datasets: units and largest values."""
 
-from __future__ import annotations
-
 import xarray as xr
 
 from paraflex.results.numbers import largest, units_of_each

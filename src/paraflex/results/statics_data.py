@@ -1,7 +1,5 @@
 """Labelled dataset of static equilibria: steps with coordinates, forces, stiffness, buckling, deformed shapes."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Iterable
 from typing import Any

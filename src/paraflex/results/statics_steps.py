@@ -1,12 +1,11 @@
 """Steps of static equilibria in a dataset: units, kinds and parts of the branch, buckling shapes."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
+
+from paraflex.arrays import Mask
 
 # Units of quantities of named coordinates: for lengths, and for angles.
 NAMED_UNITS = {
@@ -24,9 +23,9 @@ def step_kinds(data: xr.Dataset) -> list[str]:
 class BranchParts(NamedTuple):
     """Masks (steps,) for drawing a branch: a curve of stable steps, one of unstable steps, and limit points."""
 
-    stable: NDArray[np.bool_]
-    unstable: NDArray[np.bool_]
-    limit: NDArray[np.bool_]
+    stable: Mask
+    unstable: Mask
+    limit: Mask
 
 
 def branch_parts(data: xr.Dataset) -> BranchParts:

@@ -6,14 +6,11 @@ magnified elastic deviation. This base is therefore used only if a joint slides 
 with the position of the joint.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
-from paraflex.arrays import Array
+from paraflex.arrays import Array, Mask
 from paraflex.dynamics import System, build_system
 from paraflex.dynamics.joint_coordinates import joint_coordinate
 from paraflex.dynamics.signals import no_signals
@@ -117,7 +114,7 @@ def _closed(system: System, drawn: Sequence[Outline], q: Array, driven: Mapping[
     return None
 
 
-def _rows(system: System, q: Array, chosen: NDArray[np.bool_], driven: Mapping[str, Array]) -> tuple[Array, Array]:
+def _rows(system: System, q: Array, chosen: Mask, driven: Mapping[str, Array]) -> tuple[Array, Array]:
     """Return the residuals (k, m) of joints and of driven coordinates, and their Jacobian (k, m, n)."""
     phi, jacobian = np.zeros((len(q), system.m)), np.zeros((len(q), system.m, system.n))
     signals, scratch = no_signals(system.packed), make_scratch(system.packed)

@@ -1,7 +1,5 @@
 """Storage of results on disk: netCDF files with a versioned schema, written completely or not at all."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Mapping
 from importlib.metadata import version

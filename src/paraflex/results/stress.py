@@ -1,14 +1,11 @@
 """Section forces and stresses of beams as variables of datasets."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from paraflex.arrays import Array
+from paraflex.arrays import Array, NDArray
 from paraflex.dynamics import System
 from paraflex.dynamics.sections import SectionLoads, Sections, sections_of
 from paraflex.results.beam_stresses import CONTACT, SECTION

@@ -1,7 +1,5 @@
 """Results of runs as plain numbers: the contents of `summary.json`."""
 
-from __future__ import annotations
-
 import json
 from typing import Any
 

@@ -1,15 +1,13 @@
 """Time series (traces) of a run at its samples, from which metrics are computed."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
+from paraflex.arrays import Mask, NDArray
 from paraflex.results.formulas import during_motion, length
 
 # Real for a run, complex for a run with a complex step.
@@ -41,7 +39,7 @@ class Traces:
     torque: Trace
 
     @cached_property
-    def moving(self) -> NDArray[np.bool_]:
+    def moving(self) -> Mask:
         """Mask (k,) of the samples during the motion along the path; the others are after it."""
         return during_motion(self.t, self.motion_end)
 

@@ -1,7 +1,5 @@
 """Results of a verification: runs of several models of one mechanism, and the distances between them."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from enum import Enum

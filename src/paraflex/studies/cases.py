@@ -1,7 +1,5 @@
 """Test cases for comparing integration methods: one motion, and the points whose positions define the error."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import partial

@@ -1,7 +1,5 @@
 """Work-precision comparison of integration methods on one motion, with errors relative to a converged run."""
 
-from __future__ import annotations
-
 import math
 import time
 import warnings

@@ -1,7 +1,5 @@
 """Results of a comparison of methods: one row per run, the reference, and the wall time needed for an error."""
 
-from __future__ import annotations
-
 import os
 import platform
 from contextlib import suppress

@@ -1,7 +1,5 @@
 """HTML representation of the results of studies in notebooks."""
 
-from __future__ import annotations
-
 from paraflex.designs.sweep import SweepResult
 from paraflex.display import described, facts, page, sentence, table
 from paraflex.figures import search, sensitivity

@@ -1,7 +1,5 @@
 """Comparison of control laws in several actuation modes: every law is run in every mode."""
 
-from __future__ import annotations
-
 import copy
 import time
 from collections.abc import Callable, Mapping, Sequence

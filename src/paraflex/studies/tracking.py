@@ -1,7 +1,5 @@
 """Tracking study, as in the paper: one path in several actuation modes, with the results in one dataset."""
 
-from __future__ import annotations
-
 import os
 import threading
 import time

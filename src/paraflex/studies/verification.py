@@ -1,7 +1,5 @@
 """Verification study: one mechanism and path by several models and engines, each with finer steps and meshes."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial

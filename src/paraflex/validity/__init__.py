@@ -4,8 +4,6 @@ Linear geometry neglects the shortening of beams by bending, and the effect of a
 geometry includes both, and neglects terms of fourth order in the slopes.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 
 from paraflex.dynamics import System

@@ -3,8 +3,6 @@
 As in `numbers`, each bound is wide: values beyond it are hardly ever intended.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 from paraflex.arrays import Array

@@ -1,7 +1,5 @@
 """Bending of each flexible body over a run, and its axial force."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

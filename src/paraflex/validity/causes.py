@@ -1,7 +1,5 @@
 """Search for the value of a model that most likely made a run fail, for example in a wrong unit."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import replace
 

@@ -3,8 +3,6 @@
 Limits were measured by `benchmarks/validity.py`; its tables are in `docs/validity.md`.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import NamedTuple, TypeVar

@@ -3,8 +3,6 @@
 Each bound is wide: values beyond it are hardly ever intended, and if they are, the finding does no harm.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from itertools import combinations

@@ -1,7 +1,5 @@
 """Plausibility of the results of a run, against expectations from mass, size and speed of the mechanism."""
 
-from __future__ import annotations
-
 import itertools
 import math
 from collections.abc import Iterator, Mapping

@@ -1,7 +1,5 @@
 """Requests of commands on models, most of which need no run."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from typing import ClassVar
 

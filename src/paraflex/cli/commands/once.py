@@ -1,7 +1,5 @@
 """Commands that accept each option once, unless its help calls it repeatable."""
 
-from __future__ import annotations
-
 import copy
 from typing import Any
 

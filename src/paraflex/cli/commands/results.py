@@ -1,7 +1,5 @@
 """Requests of commands on stored results."""
 
-from __future__ import annotations
-
 from dataclasses import MISSING, dataclass
 from functools import partial
 

@@ -1,7 +1,5 @@
 """Requests of commands that simulate a mechanism."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 
 from paraflex.cli.commands.options import (

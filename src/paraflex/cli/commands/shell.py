@@ -3,8 +3,6 @@
 The module of the function is imported only when the command is called.
 """
 
-from __future__ import annotations
-
 from contextlib import AbstractContextManager, nullcontext
 from importlib import import_module
 from typing import Any, NamedTuple

@@ -1,7 +1,5 @@
 """Requests of commands for studies of many runs."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from pathlib import Path
 

@@ -10,10 +10,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import scipy
-from numpy.typing import ArrayLike
 
 from paraflex.arguments import checked_arguments
-from paraflex.arrays import Array, Complex
+from paraflex.arrays import Array, ArrayLike, Complex
 from paraflex.control.design.controllability import frequency_of
 from paraflex.control.design.sampled import SampledPlant, WithPoles, as_sampled, discretise, places
 from paraflex.control.laws.discrete import DiscreteModel, check_discrete, is_model, matrices_of

@@ -1,7 +1,5 @@
 """Coloured disturbances: noise through filters, whose states are added to those of the plant."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Reachability and observability of a sampled plant: motions that motors do not reach or readings do not show."""
 
-from __future__ import annotations
-
 import numpy as np
 import scipy
 

@@ -1,7 +1,5 @@
 """Design of rate feedback gains that maximise the damping of vibrations in the sampled closed loop."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple

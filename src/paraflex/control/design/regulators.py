@@ -1,16 +1,13 @@
 """Linear-quadratic design of sampled controllers: state feedback (LQR), and feedback of a Kalman filter (LQG)."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 import scipy
-from numpy.typing import ArrayLike
 
 from paraflex.arguments import checked_arguments, numbers_in
-from paraflex.arrays import Array
+from paraflex.arrays import Array, ArrayLike
 from paraflex.control.design.coloured import disturbed_plant
 from paraflex.control.design.controllability import check_controllable
 from paraflex.control.design.sampled import SampledPlant, as_sampled, places

@@ -1,7 +1,5 @@
 """Exact sampling of linear models with zero-order hold and input delay."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -109,7 +107,7 @@ class SampledPlant:
         return self.C[places(names, self.outputs, field, "output")]
 
     @checked_arguments()
-    def select(self, inputs: Sequence[str] | None = None, outputs: Sequence[str] | None = None) -> SampledPlant:
+    def select(self, inputs: Sequence[str] | None = None, outputs: Sequence[str] | None = None) -> "SampledPlant":
         """Return the plant with some inputs and outputs only; the torques of other inputs are zero.
 
         Raises

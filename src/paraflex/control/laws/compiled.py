@@ -1,7 +1,5 @@
 """Compilation of users' control laws, with array bounds checked, and their C entry points for the time loop."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -65,7 +63,7 @@ class CompiledLaw(Law):
             raise InputError("is out of range", field="states", value=self.states,
                              remedy=f"give the number of states, at most {MOST_STATES}")  # fmt: skip
 
-    def start(self, plant: Plant) -> CompiledInRun:
+    def start(self, plant: Plant) -> "CompiledInRun":
         """Return the law in a run: see `Law.start`."""
         return CompiledInRun(self.function, len(plant.inputs), self.states, len(plant.outputs))
 

@@ -1,7 +1,5 @@
 """Interface of a controller, and the plant description that it receives when it starts."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any, Protocol, runtime_checkable
 

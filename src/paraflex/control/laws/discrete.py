@@ -1,7 +1,5 @@
 """Discrete state-space models as control laws."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any

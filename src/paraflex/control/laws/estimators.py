@@ -1,7 +1,5 @@
 """State estimation from readings: the steady-state Kalman filter, and rates of quantised readings."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, NamedTuple

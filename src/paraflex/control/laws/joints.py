@@ -1,7 +1,5 @@
 """Gains of joint controllers, and the part of torques that only strains links against one another."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import NamedTuple
 

@@ -1,7 +1,5 @@
 """Linear control laws with limits, stepped here and, from the same matrices, by the compiled time loop."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from typing import NamedTuple
 

@@ -1,7 +1,5 @@
 """Results of a linear-quadratic design: state feedback, and the control law that acts on a filter's estimate."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -116,11 +114,11 @@ class LQGDesign(WithPoles):
                        np.eye(len(rows), n + len(rows), n)])  # fmt: skip
         return StateSpace(A, np.vstack([one.A @ L + one.B @ D, rows]), C, D)
 
-    def law(self) -> LQGLaw:
+    def law(self) -> "LQGLaw":
         """Return the control law in its initial state, for `SampledController`."""
         return LQGLaw(self)
 
-    def in_run(self, plant: Plant | None = None) -> LQGInRun:
+    def in_run(self, plant: Plant | None = None) -> "LQGInRun":
         """Return the control law with the states of `state_space`, for a run or, without a plant, for steps by hand.
 
         The estimate is propagated with the limited torques, and the integrals stay constant while any torque is

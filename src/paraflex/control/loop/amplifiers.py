@@ -1,7 +1,5 @@
 """Amplifiers and windings between a controller's torques and those of motors: limits and lags."""
 
-from __future__ import annotations
-
 from math import inf
 
 import numpy as np

@@ -4,8 +4,6 @@ The order is: sample, quantise, filter, law, saturate, limit the rate, delay, ho
 loop that runs the controller.
 """
 
-from __future__ import annotations
-
 import copy
 import inspect
 from collections.abc import Callable, Mapping, Sequence
@@ -278,7 +276,7 @@ class _OwnSteps(StartedLaw):
     def __init__(self, law: Any) -> None:
         self._law = law
 
-    def __deepcopy__(self, memo: dict[int, Any]) -> _OwnSteps:
+    def __deepcopy__(self, memo: dict[int, Any]) -> "_OwnSteps":
         return _OwnSteps(copy.deepcopy(self._law, memo))
 
     @property

@@ -1,7 +1,5 @@
 """Filters as users specify them: a cut-off frequency or a transfer function."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Torques held between instants: conversion of the given torques, limits, writing into input signals, and log."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 

@@ -1,7 +1,5 @@
 """Controllers in the compiled time loop: a single sampled controller with a linear law or a compiled function."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Fast evaluation of sensor readings at single instants, for controllers that sample at about 1 kHz."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -111,7 +109,7 @@ class Readings:
         """Whether all readings are linear or positions."""
         return not self._others
 
-    def only(self, names: Sequence[str]) -> Readings:
+    def only(self, names: Sequence[str]) -> "Readings":
         """Return the readings of some of the sensors."""
         places = [self.names.index(name) for name in names]
         return Readings(self.system, [self.sensors[k] for k in places], [self._found[k] for k in places])

@@ -1,7 +1,5 @@
 """References that are subtracted from readings: numbers, functions of time, the planned motion, or another run."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any

@@ -1,7 +1,5 @@
 """Schedule of the sampled controllers of a simulation: sample times, delayed torques and records of each."""
 
-from __future__ import annotations
-
 import copy
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass

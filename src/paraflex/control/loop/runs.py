@@ -1,7 +1,5 @@
 """Runs under controllers, along a plan or without a path, and the check of their sampled loop for stability."""
 
-from __future__ import annotations
-
 from copy import copy
 from dataclasses import dataclass
 from functools import cached_property
@@ -113,7 +111,7 @@ class TorqueLog:
         """Time of the last command, torques that acted then, and torques commanded from then on (motors,)."""
         return self._commands[-1]
 
-    def copy(self) -> TorqueLog:
+    def copy(self) -> "TorqueLog":
         """Return a copy that can be continued independently."""
         other = copy(self)
         other._commands = self._commands.copy()

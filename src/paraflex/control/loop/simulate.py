@@ -1,7 +1,5 @@
 """Runs under the controllers of a model file."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from typing import Any
 

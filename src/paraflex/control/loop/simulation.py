@@ -1,7 +1,5 @@
 """Simulation that is advanced in steps: torques held from one instant to the next, sensor readings, saved states."""
 
-from __future__ import annotations
-
 import hashlib
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager

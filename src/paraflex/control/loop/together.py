@@ -1,7 +1,5 @@
 """Names and periods of controllers that act together."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Collection, Mapping, Sequence
 from functools import partial

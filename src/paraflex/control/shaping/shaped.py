@@ -1,7 +1,5 @@
 """Shaped motions: a path, or the torques of a plan, convolved with the impulses of a shaper."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, field, fields, replace
 

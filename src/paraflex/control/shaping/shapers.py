@@ -1,7 +1,5 @@
 """Input shapers: short impulse sequences whose convolution with a command leaves modes of known frequency at rest."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from enum import Enum

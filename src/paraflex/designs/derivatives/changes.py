@@ -1,7 +1,5 @@
 """Derivatives of the inputs of a run with respect to one parameter: system, planned motion, torques, times."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, NamedTuple
@@ -165,7 +163,7 @@ class Change:
         return build_system(with_fields(mechanism, springs=(), dampers=(), frictions=()), self.closure.system)
 
     @cached_property
-    def sampled(self) -> _Planned:
+    def sampled(self) -> "_Planned":
         """Planned motion at the sample times."""
         t = self.planned.motion.t
         return self.plan(self.planned.motion, self.planned.effort, t * (part(self.there.end) / self.end))
@@ -185,7 +183,7 @@ class Change:
             raise another_layout(f"vary.{self.name}")
         return knots
 
-    def plan(self, motion: RigidMotion, effort: Effort, d_times: Array) -> _Planned:
+    def plan(self, motion: RigidMotion, effort: Effort, d_times: Array) -> "_Planned":
         """Return a planned motion and its derivatives, at times with the derivatives `d_times`."""
         path = self.known_path(stepped(motion.t, d_times))
         change = motion_sensitivity(self.closure, motion, self._nearby(motion, d_times, path))

@@ -1,7 +1,5 @@
 """Gradients of the metrics of a design's runs with respect to its parameters."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any

@@ -1,7 +1,5 @@
 """Inputs of a run, values and sizes of its parameters, and checks that derivatives exist."""
 
-from __future__ import annotations
-
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 

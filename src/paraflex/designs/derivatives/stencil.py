@@ -1,7 +1,5 @@
 """Finite differences of high order for functions that are smooth to rounding, with an error estimate."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from math import factorial
 from typing import NamedTuple

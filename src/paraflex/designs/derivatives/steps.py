@@ -5,8 +5,6 @@ order over about a hundredth of their size are exact to rounding. Functions eval
 h times their own derivatives as imaginary parts, without cancellation.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, is_dataclass
 from typing import Any, Generic, TypeVar

@@ -1,7 +1,5 @@
 """Confidence intervals of identified parameters, and checks of their validity."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -74,7 +72,7 @@ class Confidence:
             "telling": self.identifiable,
         }
 
-    def without_errors(self, reason: str) -> Confidence:
+    def without_errors(self, reason: str) -> "Confidence":
         """Return a copy without deviations and standard errors, with a reason for each free parameter."""
         none = dict.fromkeys(self.deviations)
         reasons = {name: self.reasons[name] if name not in self.free else reason for name in none}

@@ -1,7 +1,5 @@
 """Evaluation of designs, each once and several in parallel, with the rows of their runs."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -92,7 +90,7 @@ class Evaluate:
     journal: Journal
     engine: Engine
     run: RunTask = run_task
-    on_evaluated: Callable[[Evaluate, EvaluatedDesign], None] | None = None
+    on_evaluated: "Callable[[Evaluate, EvaluatedDesign], None] | None" = None
     run_slopes: RunTask | None = None
 
     def __post_init__(self) -> None:
@@ -171,7 +169,7 @@ class Evaluate:
                 first = number * runs
                 yield design, tuple(row | {"run": first + k, "design": number} for k, row in enumerate(ordered))
 
-    def _jobs(self, designs: list[Design]) -> Iterator[Job]:
+    def _jobs(self, designs: list[Design]) -> "Iterator[Job]":
         """Yield one job per design and path, or one per mode if workers would be idle; rows do not depend on it."""
         setting = self.study.setting
         apart = len(designs) * len(setting.paths) < self.engine.workers

@@ -1,7 +1,5 @@
 """Least-squares problem of an identification."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Identification of the parameters that reproduce given metrics."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, ClassVar

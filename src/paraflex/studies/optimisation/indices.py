@@ -1,7 +1,5 @@
 """Global sensitivity analysis: Sobol indices, the shares of a metric's variance explained by the parameters."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -9,10 +7,9 @@ from typing import Any
 
 import numpy as np
 import xarray as xr
-from numpy.typing import NDArray
 
 from paraflex.arguments import checked_arguments
-from paraflex.arrays import Array
+from paraflex.arrays import Array, Mask
 from paraflex.campaign import OnProgress, Study, Workers
 from paraflex.designs.run import STATUS_COMPLETE, RunTask, run_task
 from paraflex.designs.samples import RANDOM
@@ -210,9 +207,7 @@ def _indices(study: IndicesStudy, table: Path) -> list[dict[str, Any]]:
     return out
 
 
-def _analysed(
-    study: IndicesStudy, names: tuple[str, str, str], values: Array, usable: NDArray[np.bool_]
-) -> dict[str, Any]:
+def _analysed(study: IndicesStudy, names: tuple[str, str, str], values: Array, usable: Mask) -> dict[str, Any]:
     """Compute the indices from the base samples whose runs are all complete."""
     kept = usable.reshape(study.samples, -1).all(axis=1)
     count = int(np.count_nonzero(kept))

@@ -1,7 +1,5 @@
 """Objectives and targets: scalar values of a design from the metrics of its runs, and their derivatives."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 

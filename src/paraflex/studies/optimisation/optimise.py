@@ -1,7 +1,5 @@
 """Optimisation of a design: the search for the minimum of an objective."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path

@@ -1,7 +1,5 @@
 """Base class of the results of optimisations and identifications, and the model file of the best design."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field

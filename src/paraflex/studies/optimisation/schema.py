@@ -1,7 +1,5 @@
 """The schema of a search's study file in pydantic: that of a sweep with further tables."""
 
-from __future__ import annotations
-
 from typing import Literal
 
 from pydantic import Field

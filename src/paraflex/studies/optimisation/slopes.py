@@ -1,7 +1,5 @@
 """Derivatives of metrics with respect to unit-cube coordinates: finite differences, or exact derivatives of runs."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 

@@ -1,7 +1,5 @@
 """Base class of optimisation and identification studies, and reading of their files."""
 
-from __future__ import annotations
-
 from abc import abstractmethod
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass

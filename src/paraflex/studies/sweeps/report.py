@@ -1,7 +1,5 @@
 """Report of the folder of a study: its rows, and its best runs, which are repeated for the animation."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path

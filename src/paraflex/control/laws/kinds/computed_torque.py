@@ -6,8 +6,6 @@ mechanism, for redundant encoders in the least-squares sense. The torques are th
 torque, feed-forward must not act as well.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import ClassVar, NamedTuple
 
@@ -60,7 +58,7 @@ class ComputedTorque(Law, kind="computed-torque", title="computed torque"):
     )
     cutoff: float | None = given(*CUTOFF, default=None)
 
-    def start(self, plant: Plant) -> RigidInverse:
+    def start(self, plant: Plant) -> "RigidInverse":
         """Return the law in a run: see `Law.start`."""
         from paraflex.control.loop.references import planned_motion
 

@@ -6,8 +6,6 @@ torques that acts on the motion; without it, each contradiction causes torques t
 another. B is the rigid actuation matrix on the planned motion.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, ClassVar

@@ -1,7 +1,5 @@
 """Feedback of the rates of readings."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Discrete state-space models whose matrices are given in a file."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
