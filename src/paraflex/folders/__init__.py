@@ -16,10 +16,8 @@ from paraflex.folders.kinds import (
     SENSITIVITY as SENSITIVITY,
     STUDY_OF_RUNS as STUDY_OF_RUNS,
     VERIFICATION as VERIFICATION,
-    ResultKind as ResultKind,
 )
 from paraflex.folders.lock import (
-    LOCK as LOCK,
     FolderInUseError as FolderInUseError,
     finish_change as finish_change,
     lock_folder as lock_folder,

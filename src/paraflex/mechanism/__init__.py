@@ -42,7 +42,6 @@ from paraflex.mechanism.joints import (
     SlidingJoint as SlidingJoint,
     SlotJoint as SlotJoint,
     WeldJoint as WeldJoint,
-    points_named as points_named,
 )
 from paraflex.mechanism.loads import (
     AppliedTorque as AppliedTorque,
@@ -84,13 +83,11 @@ from paraflex.mechanism.sections import (
     Rectangle as Rectangle,
     Round as Round,
     Section as Section,
-    Shape as Shape,
     Tube as Tube,
 )
 from paraflex.mechanism.segments import (
     FIRST_END as FIRST_END,
     LAST_END as LAST_END,
-    SegmentedMechanism as SegmentedMechanism,
     check_segmentable as check_segmentable,
     finite_segments as finite_segments,
     is_hinge as is_hinge,
@@ -102,7 +99,6 @@ from paraflex.mechanism.sensors import (
     DeflectionSensor as DeflectionSensor,
     Encoder as Encoder,
     JointForceSensor as JointForceSensor,
-    PointSensor as PointSensor,
     PositionSensor as PositionSensor,
     Sensor as Sensor,
     StrainGauge as StrainGauge,
