@@ -110,11 +110,21 @@ def _as_python(kernel, known):
         source = kernel.py_func
         names = dict(source.__globals__)
         known[kernel] = types.FunctionType(source.__code__, names, source.__name__, source.__defaults__)
-        for name, value in list(names.items()):
-            if hasattr(value, "py_func"):
-                names[name] = _as_python(value, known)
-            elif value in (math.sin, math.cos, math.sqrt):
-                names[name] = _counted(value)
-            elif callable(value) and value in _VECTORS:
-                names[name] = _VECTORS[value]
+        _count_names(names, known)
     return known[kernel]
+
+
+def _count_names(names, known):
+    """Replace what counts among the names of a module, and in the kernels' modules among them."""
+    for name, value in list(names.items()):
+        if hasattr(value, "py_func"):
+            names[name] = _as_python(value, known)
+        elif isinstance(value, types.ModuleType) and value.__name__.startswith("paraflex.kernel."):
+            if value not in known:
+                known[value] = types.SimpleNamespace(**vars(value))
+                _count_names(vars(known[value]), known)
+            names[name] = known[value]
+        elif value in (math.sin, math.cos, math.sqrt):
+            names[name] = _counted(value)
+        elif callable(value) and value in _VECTORS:
+            names[name] = _VECTORS[value]
