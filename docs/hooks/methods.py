@@ -8,7 +8,7 @@ import numpy as np
 
 from paraflex.integrators import METHODS, Method
 from paraflex.integrators.methods import Family
-from paraflex.integrators.spectra import spectrum
+from paraflex.integrators.spectra import highest_formula, spectrum
 
 MARK = "<!-- methods -->"
 COLUMNS = ("Method", "In Python", "By", "Equations", "Order", "Amplitude lost in a period", "Period too long by",
@@ -35,7 +35,7 @@ def _row(method: Method) -> str:
     order = ORDERS.get(method.name, 2) if method.multistep else None
     found = spectrum(method, FREQUENCIES, order=order)
     shown = "" if order is None else f" (order {order})"
-    orders = f"1 to {method.highest_order}" if method.multistep else str(method.order)
+    orders = f"1 to {highest_formula(method)}" if method.multistep else str(method.order)
     parameters = ", ".join(f"{name}={value:g}" for name, value in method.values.items())
     cells = (
         f"`{method}`",

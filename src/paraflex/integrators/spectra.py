@@ -193,10 +193,14 @@ def wilson_step(x: float, theta: float) -> Numbers:
     )
 
 
+def highest_formula(method: Method) -> int:
+    """Return the highest order of a multistep method's formulas; a run may limit it further."""
+    return int(method.parameters["max_order"].high) if "max_order" in method.parameters else method.order
+
+
 def multistep_formula(method: Method, order: int | None) -> tuple[Numbers, Numbers]:
     """Return coefficients of new and old values and of their derivatives, the newest first, padded to one length."""
-    # A run may limit the order further.
-    highest = int(method.parameters["max_order"].high) if "max_order" in method.parameters else method.order
+    highest = highest_formula(method)
     if order is None or not (isinstance(order, int) and 1 <= order <= highest):
         raise InputError(
             f"{method} needs an order", field="order", value=order, remedy=f"choose one from 1 to {highest}"
