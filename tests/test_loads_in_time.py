@@ -417,6 +417,10 @@ def test_files_give_loads_in_time_and_take_them(tmp_path, text, components):
             FORCE_AT + "pieces = [{ until = 1, force = [1, 0] }, { until = 1, force = [2, 0] }, { force = [0, 0] }]",
             "load.push.pieces: the times of pieces must ascend from 0 (got 1.0)",
         ),
+        (
+            TORQUE_AT + "pieces = [{ until = 1, torque = 2 }, { until = 0.5, torque = 2 }, { torque = 2 }]",
+            "load.push.pieces: the times of pieces must ascend from 0 (got 0.5)",
+        ),
         (TORQUE_AT + "pieces = [{ until = 1, force = 1 }, { torque = 0 }]", "load.push.pieces.0"),
         (FORCE_AT + 'force = [1, 0]\ninterpolation = "linear"', "load.push.interpolation: is for tables only (got"),
         (FORCE_AT + 'table = "force.csv"\ninterpolation = "cubic"', "load.push.interpolation"),
