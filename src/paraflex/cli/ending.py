@@ -38,19 +38,7 @@ def print_results(
     as_json: bool,
     findings: Iterable[Finding] | None = None,
 ) -> None:
-    """Print results as JSON or as tables, preceded by the findings that make them doubtful (on stderr for JSON).
-
-    Parameters
-    ----------
-    numbers : dict
-        Results in plain values.
-    show : callable
-        Function that prints tables to a console.
-    as_json : bool
-        Whether to print JSON instead of tables.
-    findings : iterable of Finding, optional
-        Findings to print; by default those of the verdict in `numbers`.
-    """
+    """Print numbers as JSON, or tables by `show`, after findings (stderr for JSON), by default those of the verdict."""
     out = PlainConsole()
     if findings is None:
         findings = map(Finding.from_dict, numbers["verdict"]["findings"])

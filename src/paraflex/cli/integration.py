@@ -9,10 +9,7 @@ from paraflex.cli.commands.runs import RunRequest
 from paraflex.cli.stops import number_in_option, parse_event
 from paraflex.errors import InputError
 from paraflex.files import StudyDefaults
-from paraflex.integrators import (
-    IntegrationOptions,
-    Treatment,
-)
+from paraflex.integrators import IntegrationOptions, Treatment
 from paraflex.mechanism import ActuationMode, Mechanism
 from paraflex.motion import MotionRun
 from paraflex.reduced_bodies import reduced_mechanism

@@ -88,17 +88,7 @@ class Observer:
         self._scale = scale
 
     def __call__(self, k: int, readings: Mapping[str, float], random: np.random.Generator) -> Array:
-        """Return the observation (names,) at instant k.
-
-        Parameters
-        ----------
-        k : int
-            Index of the instant.
-        readings : mapping of str to float
-            Readings of all sensors by name.
-        random : Generator
-            Generator of the noise.
-        """
+        """Return the observation (names,) at instant k from the readings of all sensors, with noise from `random`."""
         y = np.array([readings[name] for name in self._sensors])
         if np.any(self._deviations):
             y += self._deviations * random.standard_normal(y.size)
@@ -108,14 +98,7 @@ class Observer:
 
 
 def observed_sensors(given: Sequence[str] | None, simulation: Simulation) -> tuple[str, ...]:
-    """Return the names of the observed sensors.
-
-    Parameters
-    ----------
-    given : sequence of str or None
-        Names of sensors. By default the encoders of the motors and the coordinates x and y of the end-effector.
-    simulation : Simulation
-        Simulation with these sensors.
+    """Return the given names of sensors, by default those of the motors' encoders and of the end-effector's x and y.
 
     Raises
     ------

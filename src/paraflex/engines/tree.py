@@ -15,28 +15,24 @@ from paraflex.tracking import TrackingTask
 class Link:
     """Body connected by a hinge to its parent in the tree, which may be the ground."""
 
-    name: str
     joint: Joint
+    own: PointRef  # points of the hinge on the body and on the parent
+    other: PointRef
 
     @property
-    def sign(self) -> float:
-        """Sign of the joint angle relative to the hinge angle, which is that of the child relative to the parent."""
-        return 1.0 if self.joint.b.body == self.name else -1.0
-
-    @property
-    def own(self) -> PointRef:
-        """Point of the hinge on the body."""
-        return self.joint.b if self.sign > 0.0 else self.joint.a
-
-    @property
-    def other(self) -> PointRef:
-        """Point of the hinge on the parent."""
-        return self.joint.a if self.sign > 0.0 else self.joint.b
+    def name(self) -> str:
+        """Name of the body."""
+        return self.own.body
 
     @property
     def parent(self) -> str:
         """Name of the parent body, or of the ground."""
         return self.other.body
+
+    @property
+    def sign(self) -> float:
+        """Sign of the joint angle relative to the hinge angle, which is that of the child relative to the parent."""
+        return 1.0 if self.joint.b == self.own else -1.0
 
 
 @dataclass(frozen=True)
@@ -79,37 +75,30 @@ def spanning_tree(mechanism: Mechanism) -> Tree:
     parts = DisjointSet([GROUND, *(body.name for body in mechanism.bodies)])
     kept = [joint for joint in ranked if parts.merge(joint.a.body, joint.b.body)]
     links: list[Link] = []
-    hung, left = {GROUND}, [body.name for body in mechanism.bodies]
-    while left:
-        found = [
-            Link(child.body, joint)
+    angles = {GROUND: np.zeros(len(mechanism.bodies))}
+    for own_angle in np.eye(len(mechanism.bodies)):
+        hanging = (
+            Link(joint, child, parent)
             for joint in kept
             for parent, child in ((joint.a, joint.b), (joint.b, joint.a))
-            if parent.body in hung and child.body in left
-        ]
-        if not found:
-            raise InputError("nothing joins it to the ground", field=f"body.{left[0]}", remedy="add a joint")
-        new = found[0]
-        links.append(new)
-        hung.add(new.name)
-        left.remove(new.name)
-    angles = {GROUND: np.zeros(len(links))}
-    for i, link in enumerate(links):
-        angles[link.name] = angles[link.parent] + np.eye(len(links))[i]
+            if parent.body in angles and child.body not in angles
+        )
+        link = next(hanging, None)
+        if link is None:
+            loose = next(body.name for body in mechanism.bodies if body.name not in angles)
+            raise InputError("nothing joins it to the ground", field=f"body.{loose}", remedy="add a joint")
+        links.append(link)
+        angles[link.name] = angles[link.parent] + own_angle
     return Tree(tuple(links), tuple(joint for joint in ranked if joint not in kept), angles)
 
 
 def joint_state(task: TrackingTask, tree: Tree) -> tuple[Array, Array]:
     """Return angles and rates of the hinges at the start of a task, each (links,)."""
-
-    def angle(state: Array, name: str) -> float:
-        return 0.0 if name == GROUND else state[task.system.body(name).angle]
-
-    q, v = (
-        np.array([angle(state, link.name) - angle(state, link.parent) for link in tree.links])
-        for state in (task.start.q, task.start.v)
-    )
-    return q, v
+    found = []
+    for state in (task.start.q, task.start.v):
+        angle = {GROUND: 0.0} | {body.name: state[body.angle] for body in task.system.bodies}
+        found.append(np.array([angle[link.name] - angle[link.parent] for link in tree.links]))
+    return found[0], found[1]
 
 
 def body_motion(system: System, tree: Tree, hinges: tuple[Array, Array, Array]) -> tuple[Array, Array, Array]:

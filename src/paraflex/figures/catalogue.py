@@ -9,7 +9,7 @@ from importlib import import_module
 from typing import Any
 
 from paraflex.figures.charts import Chart, Panel
-from paraflex.figures.entry import Figure, entries_of, prepared
+from paraflex.figures.entry import ENTRIES, Figure, prepared
 from paraflex.folders.kinds import RESULT_KINDS
 
 
@@ -20,7 +20,7 @@ def figures_of_kind(kind: str) -> Mapping[str, Figure]:
     for each in RESULT_KINDS[kind].figures:
         module, _, name = each.partition(".")
         import_module(f"paraflex.figures.{module}")
-        entries = entries_of(f"paraflex.figures.{module}")
+        entries = ENTRIES[f"paraflex.figures.{module}"]
         found |= {name: entries[name]} if name else entries
     return found
 

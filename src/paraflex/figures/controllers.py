@@ -12,20 +12,9 @@ from paraflex.figures.charts import DOTTED, Axis, Chart, Curve, look, stairs
 from paraflex.figures.entry import figure
 from paraflex.figures.loads import run_columns
 from paraflex.figures.runs import after_motion
-from paraflex.figures.selection import names_of
 from paraflex.figures.tables import Column, Table, columns_of
 from paraflex.formatting import NO_VALUE, ROUNDING, number, quantity, text_symbol
-from paraflex.results.controllers import (
-    APPLIED,
-    CONTROLLERS,
-    INPUT,
-    OUTPUT,
-    READINGS,
-    REQUESTED,
-    SAMPLE,
-    ControllerData,
-    controllers_of,
-)
+from paraflex.results.controllers import APPLIED, CONTROLLERS, READINGS, REQUESTED, ControllerData, controllers_of
 from paraflex.units import EFFORTS, DisplayUnit
 
 _WORDS = {"rad": "angle", "m": "position", "rad/s": "rate", "m/s": "speed", **EFFORTS}
@@ -45,37 +34,37 @@ def controllers(data: xr.Dataset) -> Iterator[Chart]:
     dotted. A dashed line is a limit that a torque reaches.
     """
     for one in controllers_of(data):
-        for dim, variable in ((OUTPUT, APPLIED), (INPUT, READINGS)):
-            values = one.data[variable].transpose("mode", dim, SAMPLE).values
+        for variable in (APPLIED, READINGS):
+            names, values = one.signals(variable)
             # A mode lacks the signals of motors that it does not drive.
             known = [k for k in range(values.shape[1]) if np.isfinite(values[:, k]).any()]
-            units = [one.units[name] for name in names_of(one.data, dim)]
+            units = [one.units[name] for name in names]
             for number_of_unit, unit in enumerate(dict.fromkeys(units[k] for k in known)):
                 own = [k for k in known if units[k] == unit]
-                chart = _signals(one, dim, values[:, own], own, Axis(_WORDS.get(unit, "reading"), unit))
+                chart = _signals(one, variable, own, Axis(_WORDS.get(unit, "reading"), unit))
                 yield replace(chart, identity=f"{chart.identity}-{number_of_unit}", spans=after_motion(data))
 
 
-def _signals(one: ControllerData, dim: str, values: Array, own: Sequence[int], axis: Axis) -> Chart:
-    """Return the chart of the torques or readings (runs, signals, samples) of a controller that share a unit."""
-    names, times = names_of(one.data, dim), one.data[SAMPLE].values
+def _signals(one: ControllerData, variable: str, own: Sequence[int], axis: Axis) -> Chart:
+    """Return the chart of the torques or readings of a controller, by index, that share a unit."""
+    names, values = one.signals(variable)
 
     def held(name: str, r: int, p: int, times: Array, values: Array, **more: Any) -> Curve:
         x, y = stairs(times, values)
         return Curve(name, y, x, **{"look": look(p), "run": r, "shown": (r,)} | more)
 
-    known = [(r, p) for r in range(len(values)) for p in range(len(own)) if np.isfinite(values[r, p]).any()]
-    from_delay = times + one.delay if dim == OUTPUT else times
-    curves = [held(text_symbol(names[own[p]]), r, p, from_delay, values[r, p]) for r, p in known]
-    if dim == INPUT:
+    known = [(r, p, k) for r in range(len(values)) for p, k in enumerate(own) if np.isfinite(values[r, k]).any()]
+    from_delay = one.times + one.delay if variable == APPLIED else one.times
+    curves = [held(text_symbol(names[k]), r, p, from_delay, values[r, k]) for r, p, k in known]
+    if variable == READINGS:
         return Chart(f"readings-{one.name}", f"Controller {one.name}: readings", axis, curves)
-    wanted = one.data[REQUESTED].transpose("mode", OUTPUT, SAMPLE).values
+    _, wanted = one.signals(REQUESTED)
     curves += [
-        held("wanted by the law", r, p, times, wanted[r, own[p]], look=look(p)._replace(dash=DOTTED), desired=True,
-             quiet=True) for r, p in known
+        held("wanted by the law", r, p, one.times, wanted[r, k], look=look(p)._replace(dash=DOTTED), desired=True,
+             quiet=True) for r, p, k in known
     ]  # fmt: skip
-    bounds = [(bound, p) for p, signal in enumerate(own) for bound in one.limits[names[signal]]]
-    levels = dict.fromkeys(bound for bound, p in bounds if bound is not None and np.any(values[:, p] == bound))
+    bounds = [(bound, k) for k in own for bound in one.limits[names[k]]]
+    levels = dict.fromkeys(bound for bound, k in bounds if bound is not None and np.any(values[:, k] == bound))
     note = "Solid: torques as they act, after the delay and until the next sample; dotted: those of the law."
     title = f"Controller {one.name}: {axis.name}s"
     return Chart(f"torques-{one.name}", title, axis, curves, levels=tuple(levels), note=note)
@@ -84,12 +73,7 @@ def _signals(one: ControllerData, dim: str, values: Array, own: Sequence[int], a
 def controller_table(runs: Mapping[tuple[str, ...], Mapping[str, Any]], heads: Sequence[str] = ()) -> Table:
     """Return the table of controllers, one row for each in each run.
 
-    Parameters
-    ----------
-    runs : mapping of tuple to mapping
-        Numbers of `results.controllers.controller_figures` by the names of the run, such as its path and mode.
-    heads : sequence of str
-        Headings of the names of a run.
+    Runs are numbers of `results.controllers.controller_figures` by names, such as path and mode, which have headings.
     """
     rows = [(run, name, one) for run, of in runs.items() for name, one in of.get(CONTROLLERS, {}).items()]
     controllers = [one for *_, one in rows]
@@ -98,7 +82,7 @@ def controller_table(runs: Mapping[tuple[str, ...], Mapping[str, Any]], heads: S
         Column("controller", [f"{name}\n{one['law']}" for _, name, one in rows], "law"),
         *columns_of(controllers, ("period", "period", "s"), ("delay", "delay", "s"), shown=DisplayUnit("ms", 1e3)),
         Column("limited", [_limited(one) for one in controllers], "samples"),
-        Column("limits", ["\n".join(_limits(one["torques"])) for one in controllers]),
+        Column("limits", [_limits(one["torques"]) for one in controllers]),
         Column("largest", [_largest(one["torques"]) for one in controllers], "torque"),
         Column("internal", [_internal(runs[run]) for run, *_ in rows], "N m"),
     ], "Limited: samples at which a limit of torques or of their rates was reached. Internal: the largest torque that "
@@ -110,22 +94,20 @@ def _limited(one: Mapping[str, Any]) -> str:
     return f"{NO_VALUE if share is None else f'{number(share, 3, factor=100.0)} %'}\nof {one['samples']}"
 
 
-def _limits(torques: Mapping[str, Mapping[str, Any]]) -> list[str]:
+def _limits(torques: Mapping[str, Mapping[str, Any]]) -> str:
     """Return the limits in words, only once if they are the same for all motors."""
-    words = {motor: _limits_of(one) for motor, one in torques.items()}
-    if len(set(words.values())) == 1:
-        return [next(iter(words.values()))]
-    return [f"{text_symbol(motor)}: {word}" for motor, word in words.items()]
-
-
-def _limits_of(one: Mapping[str, Any]) -> str:
-    low, high, unit, words = one["lowest"], one["highest"], one["unit"], []
-    if low is not None or high is not None:
-        both = high is not None and low == -high
-        words.append(f"±{number(high)} {unit}" if both else f"{number(low)} to {number(high)} {unit}")
-    if one["rate"] is not None:
-        words.append(f"{number(one['rate'])} {unit}/s")
-    return ", ".join(words) or "none"
+    limits = {}
+    for motor, one in torques.items():
+        low, high, unit, words = one["lowest"], one["highest"], one["unit"], []
+        if low is not None or high is not None:
+            both = high is not None and low == -high
+            words.append(f"±{number(high)} {unit}" if both else f"{number(low)} to {number(high)} {unit}")
+        if one["rate"] is not None:
+            words.append(f"{number(one['rate'])} {unit}/s")
+        limits[motor] = ", ".join(words) or "none"
+    if len(set(limits.values())) == 1:
+        return next(iter(limits.values()))
+    return "\n".join(f"{text_symbol(motor)}: {words}" for motor, words in limits.items())
 
 
 def _largest(torques: Mapping[str, Mapping[str, Any]]) -> str:

@@ -106,10 +106,7 @@ class Figure:
 
 
 def prepared(data: Any, mode: str | None = None, models: Sequence[str] | None = None) -> Any:
-    """Return results as functions of charts take them: runs with a dimension of modes, others unchanged.
-
-    If a mode or models are given, the results are those of this mode and these models.
-    """
+    """Return results (of a mode, of models) as functions of charts take them: runs with a dimension of modes."""
     if models is not None:
         data = selected(data, "model", *models)
     if isinstance(data, xr.Dataset) and "time" in data.dims:
@@ -117,7 +114,8 @@ def prepared(data: Any, mode: str | None = None, models: Sequence[str] | None = 
     return data if mode is None else selected(data, "mode", mode)
 
 
-_MODULES: dict[str, dict[str, Figure]] = {}
+# Figures by the module that defines them, once it has been imported, and by name.
+ENTRIES: dict[str, dict[str, Figure]] = {}
 
 
 def figure(shows: str, **more: Any) -> Callable[[Charts], Charts]:
@@ -125,12 +123,7 @@ def figure(shows: str, **more: Any) -> Callable[[Charts], Charts]:
 
     def register(charts: Charts) -> Charts:
         name = charts.__name__
-        _MODULES.setdefault(charts.__module__, {})[name] = Figure(name, shows, charts, **more)
+        ENTRIES.setdefault(charts.__module__, {})[name] = Figure(name, shows, charts, **more)
         return charts
 
     return register
-
-
-def entries_of(module: str) -> Mapping[str, Figure]:
-    """Return the figures that a module, which has been imported, defines, by name."""
-    return _MODULES[module]

@@ -65,24 +65,10 @@ class ResultKind:
     listed: bool = False
 
     def refuse(self, offer: str, field: str) -> None:
-        """Check that the results offer something: "motion", "page" or "table".
-
-        Raises
-        ------
-        InputError
-            They do not; it names the field and has the remedy.
-        """
+        """Raise an `InputError` with the field and the remedy unless results offer "motion", "page" or "table"."""
         if offer in self.refusals:
             problem, remedy = self.refusals[offer]
             raise InputError(problem, field=field, remedy=remedy)
-
-    def recognises(self, found: Any) -> bool:
-        """Return whether plain numbers are of this kind."""
-        rows = [found] if not self.listed else found if isinstance(found, list) else []
-        return bool(self.marks and rows) and all(isinstance(row, Mapping) and self._marks(row) for row in rows)
-
-    def _marks(self, row: Mapping[str, Any]) -> bool:
-        return all(key in row and value in (..., row[key]) for key, value in self.marks.items())
 
 
 _NOTHING_MOVES = (

@@ -53,10 +53,7 @@ def work_sensitivity(tableau, k, history, sensitivity):
 
 @routine
 def velocity_along_curve(tableau, k, x, d_x, history, sensitivity, v, dv):
-    """Compute the velocity at fraction x of long step k, by `differentiate_nodes`, and its derivative.
-
-    They are written to v and dv.
-    """
+    """Compute the velocity v at fraction x of long step k, by `differentiate_nodes`, and its derivative dv."""
     h = history.h[k]
     differentiate_nodes(tableau, x, h, history.q[k], v)
     differentiate_nodes(tableau, x, h, sensitivity.q, dv)
@@ -82,10 +79,7 @@ def node_sensitivity(tableau, fraction, d_fraction, stages, derivatives, out):
 
 @routine
 def sensitivity_at_sample(tableau, k, i, long, history, sensitivity):
-    """Compute derivatives of the interpolated values at sample i, within step k.
-
-    The interpolated accelerations are left in sensitivity.moved_v.
-    """
+    """Compute derivatives of the values at sample i in step k; leave interpolated accelerations in moved_v."""
     t, h = history.t[k], history.h[k]
     time, d_time = sensitivity.times[i], sensitivity.sample_times[i] - sensitivity.t[k]
     piece = 0

@@ -26,6 +26,7 @@ from paraflex.errors import InputError
 from paraflex.linear.independent import independent_dense, independent_sparse
 from paraflex.mechanism import GROUND, ConstantSpeed, Mechanism, PointRef, PrescribedAngle, RevoluteJoint
 from paraflex.mechanism.cut import Cut
+from paraflex.mechanism.quantities import all_listed
 
 # Largest matrix for dense factorisation: BLAS uses a single thread for it.
 _FEW_ENTRIES = 8192
@@ -40,6 +41,21 @@ class Variable(NamedTuple):
 
     name: str
     unit: str
+
+
+def numbers_of(names: Sequence[str] | None, have: Sequence[Variable], what: str) -> Indices:
+    """Return the indices of variables by name, by default of all.
+
+    Raises
+    ------
+    InputError
+        A name is unknown.
+    """
+    known = [one.name for one in have]
+    if names is None:
+        return np.arange(len(known))
+    all_listed(names, known, f"{what}s", f"is not one of the {what}s")
+    return np.array([known.index(name) for name in names], dtype=int)
 
 
 class CoordinateChoice(NamedTuple):

@@ -10,7 +10,6 @@ G is [Phi_q; T], and H has the rows of the constraints and of the driven coordin
 is added to the derivatives of the states: s x = A x + B u + (x_1, x_2). At rest G' and G'' are zero, and c and d known.
 """
 
-from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -60,34 +59,22 @@ class Descriptor:
         blocks = [[s**2 * mass + s * damping + stiffness, rows.jacobian.T], [held, corner]]
         units = [column, size]
         if not minimal.point.at_rest:
-            along, first, place, rate = self._of_motion
+            # Matrices G, G', G''_q and G''_v; bodies that are states have rows of the unit matrix in G.
+            own = csr_matrix(scipy.sparse.eye(minimal.system.n))[minimal.chosen.bodies]
+            parts = zip(minimal.constraints[:4], minimal.joints[:4], [own, *[csr_matrix(own.shape)] * 3], strict=True)
+            along, first, place, rate = (csr_matrix(scipy.sparse.vstack(part)) for part in parts)
             blocks[0] += [damping, mass]
             blocks[1] += [None, None]
             blocks += [[first, None, along, None], [place + s * rate, None, rate, along]]
             units += [column, column]
         self._factor = Factor(csr_matrix(scipy.sparse.bmat(blocks)), np.concatenate(units))
 
-    @cached_property
-    def _of_motion(self) -> tuple[csr_matrix, csr_matrix, csr_matrix, csr_matrix]:
-        """Matrices G, G', G''_q and G''_v."""
-        minimal = self.minimal
-        bodies = minimal.chosen.bodies
-        parts = [scipy.sparse.vstack(pair) for pair in zip(minimal.constraints[:4], minimal.joints[:4], strict=True)]
-        own = csr_matrix((np.ones(bodies.size), (np.arange(bodies.size), bodies)), (bodies.size, minimal.system.n))
-        more = [own, *(csr_matrix((bodies.size, minimal.system.n)) for _ in range(3))]
-        whole = [csr_matrix(scipy.sparse.vstack(pair)) for pair in zip(parts, more, strict=True)]
-        return whole[0], whole[1], whole[2], whole[3]
-
-    @cached_property
-    def _inputs(self) -> csr_matrix:
-        """Forces and accelerations of driven coordinates (n + held, inputs) per unit input."""
-        minimal, held = self.minimal, self.minimal.held_rows.number.size
-        driven = scipy.sparse.eye(held, minimal.driven, minimal.driven - held)
-        return csr_matrix(scipy.sparse.block_diag([minimal.forces, driven]))
-
     def response(self, inputs: Indices) -> SmallMotion:
         """Compute the amplitudes of the motion for unit amplitudes of the given inputs."""
-        return self._solved(self._inputs[:, inputs].toarray(), np.zeros((2, self.minimal.chosen.freedoms, inputs.size)))
+        minimal, held = self.minimal, self.minimal.held_rows.number.size
+        driven = scipy.sparse.eye(held, minimal.driven, minimal.driven - held)
+        right = csr_matrix(scipy.sparse.block_diag([minimal.forces, driven]))
+        return self._solved(right[:, inputs].toarray(), np.zeros((2, minimal.chosen.freedoms, inputs.size)))
 
     def states(self, added: Array) -> Array:
         """Solve for the states (2f,) with `added` (2f,) added to their derivatives, for a real s."""
@@ -104,9 +91,9 @@ class Descriptor:
     def _solved(self, right: Numbers, added: Array) -> SmallMotion:
         """Solve for the motion, with the right-hand side of the first two equations and additions to x'."""
         minimal, s, n = self.minimal, self.s, self.minimal.system.n
-        whole, of_rates = minimal.tangents.whole, np.stack([added[0], s * added[0] + added[1]])
-        if not np.any(added):
-            of_rates = np.zeros((2, minimal.chosen.freedoms, right.shape[1]))
+        whole = minimal.tangents.whole
+        # Zeros stay real for any s, as the right-hand side of a response is.
+        of_rates = np.stack([added[0], s * added[0] + added[1]]) if np.any(added) else added
         if minimal.point.at_rest:
             c, d = (-minimal.coordinates(np.zeros((minimal.chosen.constraints.size, each.shape[1])), each)
                     for each in of_rates)  # fmt: skip

@@ -17,11 +17,11 @@ from paraflex.dynamics.sensors import SensorRows
 from paraflex.dynamics.sparse import stiffness_diagonal
 from paraflex.dynamics.state_space import StateSpace
 from paraflex.linear.bases import kernel
-from paraflex.linear.coordinates import Variable
+from paraflex.linear.coordinates import Variable, numbers_of
 from paraflex.linear.descriptor import poles_near, response_at
 from paraflex.linear.minimal import MinimalEquations
 from paraflex.linear.motions import Motions, SecondOrder, driven_equations, modal_damping, motions
-from paraflex.linear.named import NamedModel, numbers_of
+from paraflex.linear.named import NamedModel
 from paraflex.linear.zeros import Vibrating, by_size, vibrating_zeros, zeros
 from paraflex.mechanism.quantities import all_listed
 

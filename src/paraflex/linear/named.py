@@ -10,10 +10,9 @@ import numpy as np
 import scipy
 
 from paraflex.arguments import checked_arguments, numbers_in
-from paraflex.arrays import Array, ArrayLike, Complex, Indices
+from paraflex.arrays import Array, ArrayLike, Complex
 from paraflex.errors import InputError, optional_package
-from paraflex.linear.coordinates import Variable
-from paraflex.mechanism.quantities import all_listed, finite
+from paraflex.mechanism.quantities import finite
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -120,18 +119,3 @@ def places_in_s(frequencies: ArrayLike, field: str = "frequencies") -> Complex:
 def plain_name(name: str) -> str:
     """Replace all characters of a name except letters, digits and underscores by underscores."""
     return "".join(letter if letter.isalnum() or letter == "_" else "_" for letter in name)
-
-
-def numbers_of(names: Sequence[str] | None, have: Sequence[Variable], what: str) -> Indices:
-    """Return the indices of variables by name, by default of all.
-
-    Raises
-    ------
-    InputError
-        A name is unknown.
-    """
-    known = [one.name for one in have]
-    if names is None:
-        return np.arange(len(known))
-    all_listed(names, known, f"{what}s", f"is not one of the {what}s")
-    return np.array([known.index(name) for name in names], dtype=int)

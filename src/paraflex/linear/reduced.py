@@ -13,10 +13,10 @@ from paraflex.arrays import Array, ArrayLike, Complex
 from paraflex.dynamics.state_space import StateSpace
 from paraflex.errors import InputError
 from paraflex.linear.bases import kernel
-from paraflex.linear.coordinates import Variable
+from paraflex.linear.coordinates import Variable, numbers_of
 from paraflex.linear.model import LinearModel
 from paraflex.linear.motions import motions
-from paraflex.linear.named import NamedModel, numbers_of
+from paraflex.linear.named import NamedModel
 from paraflex.linear.zeros import by_size, zeros
 
 

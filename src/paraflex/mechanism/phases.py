@@ -9,7 +9,7 @@ from paraflex.errors import InputError
 from paraflex.mechanism.groups import Group, groups_of
 from paraflex.mechanism.joints import Joint, PointRef
 from paraflex.mechanism.members import Members
-from paraflex.mechanism.poses import Place, Pose, approximate_poses, local_points, placed_in, placed_poses
+from paraflex.mechanism.poses import Place, Pose, approximate_poses, local_points, placed_poses
 from paraflex.mechanism.quantities import positive
 
 
@@ -71,7 +71,7 @@ def _place(mechanism: Members, ref: PointRef, poses: dict[str, Pose]) -> Place |
     if ref.on_ground:
         return mechanism.ground[ref.point]
     pose = poses[ref.body]
-    return None if pose.position is None else placed_in(pose, local_points(mechanism.body(ref.body))[ref.point])
+    return None if pose.position is None else pose.place_of(local_points(mechanism.body(ref.body))[ref.point])
 
 
 def joint_value(mechanism: Members, joint: Joint, poses: dict[str, Pose]) -> float | None:

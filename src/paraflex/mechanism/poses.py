@@ -23,6 +23,12 @@ class Pose:
     angle: float
     position: Place | None = None
 
+    def place_of(self, local: Place) -> Place:
+        """Return the position of a point of the undeformed body in the ground frame [m]."""
+        assert self.position is not None
+        c, s = cos(self.angle), sin(self.angle)
+        return self.position[0] + c * local[0] - s * local[1], self.position[1] + s * local[0] + c * local[1]
+
 
 @checked_arguments()
 def approximate_poses(mechanism: Members, assembly: Assembly) -> dict[str, Pose]:
@@ -41,9 +47,8 @@ def approximate_poses(mechanism: Members, assembly: Assembly) -> dict[str, Pose]
         poses |= _from_points(mechanism, assembly.angles, assembly.points)
     for body in mechanism.bodies:
         if body.name not in poses:
-            remedy = "give its approximate angle in rad, or the places of two of its points" + _joined(
-                mechanism, body.name
-            )
+            hint = _joined(mechanism, body.name)
+            remedy = f"give its approximate angle in rad, or the places of two of its points{hint}"
             raise InputError("no angle for a body", field=f"assembly.{assembly.name}", value=body.name, remedy=remedy)
     return poses
 
@@ -75,8 +80,7 @@ def _from_points(
 ) -> dict[str, Pose]:
     """Return poses with positions, by iteration over joints and bodies; sliding joints are used last, if at all."""
     poses: dict[str, Pose] = {}
-    known: dict[PointRef, Place] = {PointRef(GROUND, name): place for name, place in mechanism.ground.items()}
-    known |= points
+    known = {PointRef(GROUND, name): place for name, place in mechanism.ground.items()} | dict(points)
     # Other joints do not determine the position of a point.
     for determining in ({"points"}, {"points", "axis"})[: 1 + sliding]:
         before = -1
@@ -94,11 +98,10 @@ def _from_points(
                     if sliding:
                         # One point only: approximate angles leave a gap, which is then at a single joint.
                         found = dict([*found.items()][:1])
-                    pose = _fit(local, found, angles.get(body.name))
-                    if pose is not None:
+                    if found and (pose := _fit(local, found, angles.get(body.name))):
                         poses[body.name] = pose
                         for name, place in local.items():
-                            known.setdefault(PointRef(body.name, name), placed_in(pose, place))
+                            known.setdefault(PointRef(body.name, name), pose.place_of(place))
     return poses
 
 
@@ -113,26 +116,15 @@ def local_points(body: Body) -> Mapping[str, Place]:
 
 def _fit(local: Mapping[str, Place], found: Mapping[str, Place], angle: float | None) -> Pose | None:
     """Return the least-squares pose for the known positions of a body's points; None if these are too few."""
-    if not found:
-        return None
-    n = len(found)
-    cx, cy = (sum(local[name][k] for name in found) / n for k in range(2))
-    gx, gy = (sum(place[k] for place in found.values()) / n for k in range(2))
+    cx, cy = (sum(local[name][k] for name in found) / len(found) for k in range(2))
+    gx, gy = (sum(place[k] for place in found.values()) / len(found) for k in range(2))
     if angle is None:
         arms = [(local[name][0] - cx, local[name][1] - cy, x - gx, y - gy) for name, (x, y) in found.items()]
         size = max(hypot(x - cx, y - cy) for x, y in local.values())
         if max(min(hypot(ax, ay), hypot(bx, by)) for ax, ay, bx, by in arms) <= _SAME_PLACE * size:
             return None
-        # Angle of the least-squares fit.
         angle = atan2(
             sum(ax * by - ay * bx for ax, ay, bx, by in arms), sum(ax * bx + ay * by for ax, ay, bx, by in arms)
         )
-    turned = placed_in(Pose(angle, (0.0, 0.0)), (cx, cy))
+    turned = Pose(angle, (0.0, 0.0)).place_of((cx, cy))
     return Pose(angle, (gx - turned[0], gy - turned[1]))
-
-
-def placed_in(pose: Pose, local: Place) -> Place:
-    """Return the position of a point of the undeformed body in the ground frame [m]."""
-    assert pose.position is not None
-    c, s = cos(pose.angle), sin(pose.angle)
-    return pose.position[0] + c * local[0] - s * local[1], pose.position[1] + s * local[0] + c * local[1]

@@ -1,5 +1,6 @@
 """Recognition of results on disk by their content: kind of results, and data for figures."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -7,7 +8,7 @@ from typing import Any
 from paraflex.campaign import tables_of
 from paraflex.errors import InputError
 from paraflex.figures.designs import DesignTable, read_designs
-from paraflex.folders import DATA_FILES, RESULT_KINDS, STUDY_OF_RUNS, check_listed
+from paraflex.folders import DATA_FILES, RESULT_KINDS, STUDY_OF_RUNS, ResultKind, check_listed
 from paraflex.seals import NETCDF, PARQUET, check_regular, unreadable
 from paraflex.writing import read_values
 
@@ -97,7 +98,16 @@ def _json(file: Path) -> Source:
 
 def kind_of_numbers(found: Any) -> str:
     """Return the kind of results with these plain numbers; empty if no figures can be drawn of them."""
-    return next((kind.name for kind in RESULT_KINDS.values() if kind.recognises(found)), "")
+    return next((kind.name for kind in RESULT_KINDS.values() if _recognised(kind, found)), "")
+
+
+def _recognised(kind: ResultKind, found: Any) -> bool:
+    """Return whether plain numbers have the marks of a kind."""
+    rows = [found] if not kind.listed else found if isinstance(found, list) else []
+    return bool(kind.marks and rows) and all(
+        isinstance(row, Mapping) and all(key in row and value in (..., row[key]) for key, value in kind.marks.items())
+        for row in rows
+    )
 
 
 def _designs(folder: Path) -> DesignTable | None:

@@ -47,6 +47,17 @@ def asked(data: xr.Dataset) -> dict[str, Any]:
         return {}
 
 
+def model_words(run: Mapping[str, Any]) -> str:
+    """Return the fidelity of the model that a request asks for, in words."""
+    if run.get("rigid"):
+        return "rigid links"
+    if run.get("ked"):
+        return "kineto-elastodynamics"
+    if run.get("segments"):
+        return f"{run['segments']} finite segments on the longest link"
+    return f"{run.get('geometry', 'linear')} geometry"
+
+
 def verdict_word(data: xr.Dataset, failed: Collection[str] = ()) -> str:
     """Return the verdict on results: "failed", "partly failed" if some modes are complete, or that of their findings.
 
@@ -106,7 +117,7 @@ def command_line(run: Mapping[str, Any]) -> str:
     words = ["paraflex", command]
     for name, value in given.items():
         if name == "model":
-            words += _model_words(run)
+            words += _model_arguments(run)
         elif name == "results":
             words += [value] if value else []
         else:
@@ -122,7 +133,7 @@ def _without_effect(run: Mapping[str, Any]) -> set[str]:
     return without if gains else without | {"alpha", "beta"}
 
 
-def _model_words(run: Mapping[str, Any]) -> list[str]:
+def _model_arguments(run: Mapping[str, Any]) -> list[str]:
     """Return the arguments of a command for a model, with its overridden values."""
     given = {name: value if isinstance(value, str) else json.dumps(value) for name, value in run.get("set", {}).items()}
     return [mechanism_argument(run["mechanism"]), *_option("--set", given),

@@ -19,7 +19,7 @@ from paraflex.report.film import NO_SHAPES, animation
 from paraflex.report.kind_page import kind_page
 from paraflex.report.loads import load_tables, load_tiles
 from paraflex.report.page import Page
-from paraflex.report.provenance import asked, common_facts, summary_beside, verdict_word
+from paraflex.report.provenance import asked, common_facts, model_words, summary_beside, verdict_word
 from paraflex.report.text import sections
 from paraflex.results.findings import finished, validity_line, validity_summary
 from paraflex.results.following import headline
@@ -61,7 +61,7 @@ def tracking_page(data: xr.Dataset, failed: Mapping[str, str] | None = None) -> 
         kind="run",
         subtitle=", ".join([f"path “{path}”", modes] if path else [modes]),
         verdict=verdict_word(data, failed or {}),
-        facts=[*([("model", _model(run))] if run else []), *_after(data), *common_facts(data)],
+        facts=[*([("model", model_words(run))] if run else []), *_after(data), *common_facts(data)],
         figures=_figures(data),
         more=[
             *sections([result_table(rows), after_table(rows)]),
@@ -101,7 +101,7 @@ def _figures(data: xr.Dataset) -> list[tuple[str, str, str]]:
         known = np.where(whole, values, np.nan)
         if np.isfinite(known).any():
             run = int(choose(known))
-            tiles.append((name, quantity(known[run], unit), _name(data, run)))
+            tiles.append((name, quantity(known[run], unit), f"mode {data['mode'].values[run]}"))
     return [*tiles, *load_tiles({name: load_figures(data.sel(mode=name)) for name in names_of(data, "mode")})]
 
 
@@ -111,12 +111,8 @@ def _broken_off(data: xr.Dataset, whole: Mask) -> tuple[str, str, str]:
     ends = [float(data["time"].values[max(samples(data.isel(mode=r)) - 1, 0)]) for r in first]
     word = str(data["status"].values[first[0]])
     value = f"{first.size} of {whole.size} modes" if whole.size > 1 else f"at {number(ends[0], 3)} s"
-    of = f"from t = {number(min(ends), 3)} s on" if whole.size > 1 else _name(data, int(first[0]))
+    of = f"from t = {number(min(ends), 3)} s on" if whole.size > 1 else f"mode {data['mode'].values[first[0]]}"
     return word, value, f"{of}, of {number(data['time'].values[-1])} s"
-
-
-def _name(data: xr.Dataset, run: int) -> str:
-    return f"mode {data['mode'].values[run]}"
 
 
 def _unfinished(data: xr.Dataset, failed: Mapping[str, str]) -> list[str]:
@@ -128,13 +124,3 @@ def _unfinished(data: xr.Dataset, failed: Mapping[str, str]) -> list[str]:
             part = "" if status in DONE_STATUSES else ". Its curves and numbers are of the part before"
             out.append(f"Mode {name}: {status}. {data['message'].values[r]}{part}".rstrip())
     return out
-
-
-def _model(run: Mapping[str, object]) -> str:
-    if run.get("rigid"):
-        return "rigid links"
-    if run.get("ked"):
-        return "kineto-elastodynamics"
-    if run.get("segments"):
-        return f"{run['segments']} finite segments on the longest link"
-    return f"{run.get('geometry', 'linear')} geometry"

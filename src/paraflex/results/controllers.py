@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import xarray as xr
 
+from paraflex.arrays import Array
 from paraflex.errors import InputError
 from paraflex.results.formulas import largest_norm
 from paraflex.results.numbers import finite_or_none, largest, name_units
@@ -72,6 +73,16 @@ class ControllerData:
     def samples(self) -> xr.DataArray:
         """Number of samples of each run."""
         return self.data[APPLIED].notnull().any(OUTPUT).sum(SAMPLE)
+
+    @property
+    def times(self) -> Array:
+        """Sample times [s]."""
+        return self.data[SAMPLE].values
+
+    def signals(self, variable: str) -> tuple[list[str], Array]:
+        """Return the names of the sensors or motors of a variable, and its values (modes, signals, samples)."""
+        dim, *_ = _VARIABLES[variable]
+        return list(map(str, self.data[dim].values)), self.data[variable].transpose("mode", dim, SAMPLE).values
 
 
 def dimension(kind: str, controller: str) -> str:

@@ -12,10 +12,6 @@ import typer
 from paraflex.cli.commands import models, results, runs, studies
 from paraflex.cli.signals import exit_code, is_taken, raised
 
-# Messages after an interruption, for studies of many runs and for other commands.
-_GOES_ON = "interrupted; what is done is kept, and the same command continues from there"
-_BEGINS = "interrupted; the same command starts over"
-
 
 class ListedCommand(NamedTuple):
     """Entry of a command: name, request, "module.function" in `paraflex.cli`, and help.
@@ -39,7 +35,8 @@ class ListedCommand(NamedTuple):
             # An interrupted library may raise an error of its own instead.
             if not isinstance(error, KeyboardInterrupt) and not is_taken():
                 raise
-            typer.echo(_GOES_ON if self.request in _STUDIES else _BEGINS, err=True)
+            kept = "what is done is kept, and the same command continues from there"
+            typer.echo(f"interrupted; {kept if self.request in _STUDIES else 'the same command starts over'}", err=True)
             return exit_code()
 
 

@@ -23,25 +23,23 @@ Reference = Callable[[float], float]
 
 
 def references(given: Mapping[str, Any] | TrackingRun | MotionRun | str | None, plant: Plant) -> list[Reference | None]:
-    """Return the reference of each of a plant's inputs; None for inputs without one.
-
-    Parameters
-    ----------
-    given : mapping of str to float or callable, "plan", "open-loop", TrackingRun, MotionRun or None
-        References as for `SampledController`.
-    plant : Plant
-        Plant with the inputs.
+    """Return the reference of each of a plant's inputs, given as for `SampledController`; None for inputs without one.
 
     Raises
     ------
     InputError
         An unknown sensor, "plan" or "open-loop" without a plan, or a value that is neither a number nor a function.
+    IntegrationError
+        The run of "open-loop", without controllers by the default method, cannot continue.
     """
     if given is None:
         return [None] * len(plant.inputs)
     if isinstance(given, str):
         if given == OPEN_LOOP:
-            return list(readings_in(open_loop(plant), plant))
+            motion = planned_motion(plant)
+            assert plant.task is not None
+            task = replace(plant.task, motion=motion, effort=required_effort(motion))
+            return list(readings_in(task.simulate(plant.mode, warning=False), plant))
         if given != PLAN:
             remedy = f'write "{PLAN}" or "{OPEN_LOOP}", or give a run, or numbers or functions of time by sensor'
             raise InputError("is not a reference", field="reference", value=given, remedy=remedy)
@@ -54,8 +52,7 @@ def references(given: Mapping[str, Any] | TrackingRun | MotionRun | str | None, 
 
 def _reference(given: Any, field: str) -> Reference:
     if isinstance(given, TimeProfile):
-        profile: TimeProfile = given
-        return lambda t: float(profile.evaluate(np.array([t]))[0][0])
+        return lambda t: float(given.evaluate(np.array([t]))[0][0])
     if callable(given):
         function: Callable[[float], Any] = given
         return lambda t: float(function(t))
@@ -98,25 +95,8 @@ def planned_motion(plant: Plant) -> RigidMotion:
 
 def planned_readings(plant: Plant) -> list[AtSamples | None]:
     """Return planned readings at a controller's samples; None for sensors that the plan does not cover."""
-    motion = planned_motion(plant)
-    found = readings_of(motion, plant.mechanism, plant.inputs)
+    found = readings_of(planned_motion(plant), plant.mechanism, plant.inputs)
     return [AtSamples(plant, found[name]) if name in found else None for name in plant.inputs]
-
-
-def open_loop(plant: Plant) -> TrackingRun:
-    """Run the plan's torques without controllers by the default method, with results at the samples of a controller.
-
-    Raises
-    ------
-    InputError
-        No plan.
-    IntegrationError
-        The integration cannot continue.
-    """
-    motion = planned_motion(plant)
-    assert plant.task is not None
-    task = replace(plant.task, motion=motion, effort=required_effort(motion))
-    return task.simulate(plant.mode, warning=False)
 
 
 def readings_in(run: TrackingRun | MotionRun, plant: Plant) -> list[AtSamples]:

@@ -69,7 +69,7 @@ class Objective:
         return np.array([(limit - metrics[column]) / (abs(limit) or 1.0) for column, limit in self.limits])
 
     def slack_gradient(self, design: EvaluatedDesign, slopes: Mapping[str, Array]) -> Array:
-        """Compute the derivatives of `room` (limits, parameters)."""
+        """Compute the derivatives of `slack` (limits, parameters)."""
         rows = [-(self._shares(design, column) @ slopes[column]) / (abs(limit) or 1.0) for column, limit in self.limits]
         return np.array(rows)
 

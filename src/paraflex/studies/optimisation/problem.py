@@ -84,7 +84,7 @@ class DesignProblem:
         return self.objective.slack(design) if design.complete else np.full(len(self.objective.limits), -1.0)
 
     def slack_gradient(self, x: Array) -> Array:
-        """Compute the derivatives of `room` (limits, parameters); zero if the design fails."""
+        """Compute the derivatives of `slack` (limits, parameters); zero if the design fails."""
         design = self.evaluate.at(x)
         if design.complete:
             return self.objective.slack_gradient(design, self.slopes(design))
@@ -100,13 +100,7 @@ class DesignProblem:
 
 
 def running_start(evaluate: Evaluate) -> EvaluatedDesign:
-    """Evaluate the start, and check that it runs.
-
-    Raises
-    ------
-    InputError
-        Start that cannot be run.
-    """
+    """Evaluate the start, and raise an `InputError` unless it can be run."""
     study = evaluate.study
     (start,) = evaluate([study.start])
     if not start.complete:
@@ -120,15 +114,11 @@ def running_start(evaluate: Evaluate) -> EvaluatedDesign:
 def best_of(
     objective: Objective, scales: Mapping[str, float], designs: Sequence[EvaluatedDesign]
 ) -> EvaluatedDesign | None:
-    """Return the complete design within the limits with the least objective, or else that with the least violation.
-
-    None is returned if no design is complete.
-    """
+    """Return the complete design of least objective within the limits, or else of least violation; None without any."""
 
     def rank(design: EvaluatedDesign) -> tuple[float, float, int]:
         violation = objective.violation(design)
-        value = objective.value(design, scales)
-        return (violation if violation > _LIMIT_EXCESS else 0.0, value, design.number)
+        return violation if violation > _LIMIT_EXCESS else 0.0, objective.value(design, scales), design.number
 
     return min((design for design in designs if design.complete), key=rank, default=None)
 

@@ -108,7 +108,6 @@ class RigidInverse(StartedLaw):
 
     def _read(self, y: Array, place: Array, pose: Array) -> tuple[Array, Array, Array]:
         """Return the end-effector's position (tasks,) at readings y, its Jacobian (tasks, joints), and the pose."""
-        size = self._closure.system.size
         for _ in range(_ITERATIONS):
             motion = self._motion(0.0, place, np.zeros_like(place), np.zeros_like(place), pose)
             pose = motion.q[0]
@@ -117,7 +116,7 @@ class RigidInverse(StartedLaw):
             rows = np.linalg.pinv(np.stack([one.rows[0] for one in each]) @ motion.basis[0])
             change = rows @ (y - read)
             place = place + change
-            if np.max(np.abs(change)) < _FOUND * size:
+            if np.max(np.abs(change)) < _FOUND * self._closure.system.size:
                 return place, rows, pose
         raise ArithmeticError("the rigid mechanism has no pose near the readings of its encoders")
 
