@@ -22,7 +22,7 @@ from paraflex.kernel.packed import INDEX_1
 from paraflex.kinematics import Line
 from paraflex.linear import linearise, states_needed
 from paraflex.linear.coordinates import coordinates_of
-from paraflex.linear.linearise import Chart, Ports, linear_model
+from paraflex.linear.linearise import ModelVariables, Ports, linear_model
 from paraflex.linear.zeros import zeros
 from paraflex.mechanism import (
     ActuationMode,
@@ -68,7 +68,7 @@ class Moving:
     def model(self, driven=()):
         motors = tuple(motor.name for motor in self.system.mechanism.motors)
         ports = Ports(ActuationMode("all", motors), (), driven, ())
-        return linear_model(Chart(coordinates_of(self.system, driven), ports, "a motion"), self.point)
+        return linear_model(ModelVariables(coordinates_of(self.system, driven), ports, "a motion"), self.point)
 
 
 @pytest.mark.parametrize("name", NAMES)

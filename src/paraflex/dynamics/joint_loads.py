@@ -43,9 +43,9 @@ class LoadComponents(NamedTuple):
     Attributes
     ----------
     force, moment : arrays
-        Those of the forces (k, joints, 2) and moments (k, joints) in joints; errors are (joints,) for both [N, N m].
+        Property of forces (k, joints, 2) and moments (k, joints) in joints; errors are (joints,) for both [N, N m].
     drive : array
-        Those of the torques or forces of prescribed motions (k, drives); errors are (drives,) [N m, N].
+        Property of torques or forces of prescribed motions (k, drives); errors are (drives,) [N m, N].
     """
 
     force: Numbers

@@ -12,10 +12,10 @@ from paraflex.dynamics.points import marker_place
 from paraflex.errors import InputError
 from paraflex.limits import solvable
 from paraflex.linear.coordinates import FirstCoordinates
-from paraflex.linear.linearise import charted
+from paraflex.linear.linearise import motion_variables
 from paraflex.linear.model import LinearModel
 from paraflex.linear.points import resting_point
-from paraflex.linear.varying import in_one_chart
+from paraflex.linear.varying import in_common_coordinates
 from paraflex.mechanism import ActuationMode
 from paraflex.motion import MotionRun
 from paraflex.tracking import TrackingRun, TrackingTask, undeformed_at
@@ -76,14 +76,14 @@ def poses_along(
     SingularPositionError
         No coordinates describe the motion at all poses.
     """
-    motion, chart = charted(source, mode, forces, prescribed, coordinates)
+    motion, variables = motion_variables(source, mode, forces, prescribed, coordinates)
     far, unit = _lengths(source)
     samples = _evenly(far, count)
     still = np.zeros(motion.system.n)
     states = [State(float(motion.times[k]), _coordinates(source, k), still) for k in samples]
     states += [] if pose is None else [pose]
-    points = [resting_point(chart.coordinates, state, chart.ports.mode)[0] for state in states]
-    models = in_one_chart(points, chart._replace(about="a pose at rest"), lambda model: model)[1]
+    points = [resting_point(variables.coordinates, state, variables.ports.mode)[0] for state in states]
+    models = in_common_coordinates(points, variables._replace(about="a pose at rest"), lambda model: model)[1]
     return PosesAlong(far[samples], unit, tuple(models[:count]), None if pose is None else models[count])
 
 

@@ -62,7 +62,7 @@ class Ports:
     sensors: tuple[Sensor, ...]
 
 
-class Chart(NamedTuple):
+class ModelVariables(NamedTuple):
     """Coordinates, inputs and outputs that linear models along a motion share.
 
     Attributes
@@ -150,7 +150,7 @@ def operating_point(
     prescribed: Sequence[str] = (),
     coordinates: FirstCoordinates | str = FirstCoordinates.MOTORS,
     **pose: Any,
-) -> tuple[Chart, MotionPoint, float]:
+) -> tuple[ModelVariables, MotionPoint, float]:
     """Return the first arguments of `linear_model` for those of `linearise`.
 
     Arguments of `linearise` that are not named here are those of `pose`, None where they are not given.
@@ -164,8 +164,8 @@ def operating_point(
                 remedy="leave it out, or give the mechanism" if moves else "leave it out, or give a plan or a run",
             )  # fmt: skip
     if moves:
-        motion, chart = charted(source, mode, forces, prescribed, coordinates)
-        return chart, motion.point(0 if at is None else nearest_sample(motion.times, at)), 0.0
+        motion, variables = motion_variables(source, mode, forces, prescribed, coordinates)
+        return variables, motion.point(0 if at is None else nearest_sample(motion.times, at)), 0.0
     mechanism = Mechanism.from_source(source)
     chosen = mode_of(source, mechanism, mode)
     ports = ports_of(mechanism, chosen, forces, prescribed)
@@ -176,14 +176,16 @@ def operating_point(
         joints = [motor.joint for motor in mechanism.motors if motor.name in chosen.motors]
         state = static_equilibrium(system, state, list(dict.fromkeys(joints)))
     own = coordinates_of(system, ports.prescribed, as_enum(FirstCoordinates, coordinates, "coordinates"))
-    return Chart(own, ports, "static equilibrium" if balanced else "a pose at rest"), *resting_point(own, state, chosen)
+    return ModelVariables(own, ports, "static equilibrium" if balanced else "a pose at rest"), *resting_point(
+        own, state, chosen
+    )
 
 
 def linear_model(
-    chart: Chart, point: MotionPoint, unbalanced: float = 0.0, *, chosen: CoordinateChoice | None = None
+    variables: ModelVariables, point: MotionPoint, unbalanced: float = 0.0, *, chosen: CoordinateChoice | None = None
 ) -> LinearModel:
     """Linearise at an operating point, in the given minimal coordinates or, by default, in those chosen there."""
-    coordinates, ports, about = chart
+    coordinates, ports, about = variables
     system = coordinates.system
     mechanism, tangents = system.mechanism, coordinates.at(point)
     chosen = coordinates.choose(tangents) if chosen is None else chosen
@@ -214,17 +216,17 @@ def linear_model(
     )
 
 
-def charted(
+def motion_variables(
     source: TrackingTask | TrackingRun | MotionRun, mode: str | ActuationMode | None, forces: Sequence[str],
     prescribed: Sequence[str], coordinates: FirstCoordinates | str,
-) -> "tuple[OperatingPoints, Chart]":  # fmt: skip
-    """Return a motion, and the chart of linear models along it."""
+) -> "tuple[OperatingPoints, ModelVariables]":  # fmt: skip
+    """Return a motion, and the variables of linear models along it."""
     task = source.task if isinstance(source, TrackingRun) else source
     mechanism = task.system.mechanism if isinstance(task, MotionRun) else task.mechanism
     ports = ports_of(mechanism, mode_of(source, mechanism, mode), forces, prescribed)
     motion = moving(source, ports.mode)
     first = as_enum(FirstCoordinates, coordinates, "coordinates")
-    return motion, Chart(coordinates_of(motion.system, ports.prescribed, first), ports, motion.about)
+    return motion, ModelVariables(coordinates_of(motion.system, ports.prescribed, first), ports, motion.about)
 
 
 def mode_of(source: object, mechanism: Mechanism, mode: str | ActuationMode | None) -> ActuationMode:

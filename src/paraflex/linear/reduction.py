@@ -149,12 +149,12 @@ def _linear_model(source: Source, given: Sequence[ReducedModel], options: dict[s
         return source
     if not given:
         return linearise(source, **options)
-    first, (chart, point, unbalanced) = given[0].full, operating_point(source, **options)
-    system = chart.coordinates.system
-    same = len(chart.coordinates.measured) > np.max(first.minimal.chosen.joints, initial=-1)
+    first, (variables, point, unbalanced) = given[0].full, operating_point(source, **options)
+    system = variables.coordinates.system
+    same = len(variables.coordinates.measured) > np.max(first.minimal.chosen.joints, initial=-1)
     if not same or not same_bodies(system, first.minimal.system):
         raise _other_mechanism_error(given[0], system.mechanism.name)
-    model = linear_model(chart, point, unbalanced, chosen=first.minimal.chosen)
+    model = linear_model(variables, point, unbalanced, chosen=first.minimal.chosen)
     _check_alike(given[0], model)
     if not describes(model.minimal, first.minimal):
         raise InputError(

@@ -26,7 +26,7 @@ from paraflex.errors import InputError, Moment, SingularPositionError, as_enum
 from paraflex.limits import solvable
 from paraflex.linear.coordinates import CoordinateChoice, Coordinates, FirstCoordinates, Variable
 from paraflex.linear.discrete import InputHold, Prediction, SampledModel, transitions
-from paraflex.linear.linearise import Chart, Ports, charted, linear_model, moving, nearest_sample
+from paraflex.linear.linearise import ModelVariables, Ports, linear_model, motion_variables, moving, nearest_sample
 from paraflex.linear.minimal import MinimalEquations
 from paraflex.linear.model import LinearModel
 from paraflex.linear.named import labelled, matrices_of
@@ -221,25 +221,25 @@ def linearise_along(
     SingularPositionError
         A position is singular, so that no coordinates describe the motion.
     """
-    motion, chart = charted(source, mode, forces, prescribed, coordinates)
+    motion, variables = motion_variables(source, mode, forces, prescribed, coordinates)
     given = range(motion.times.size) if times is None else [nearest_sample(motion.times, at) for at in times]
     samples = np.unique(given).tolist()
     if len(samples) < _FEWEST:
         raise InputError("too few samples of the motion", field="times", value=len(samples),
                          remedy=f"give at least {_FEWEST} different ones")  # fmt: skip
     points = [motion.point(k) for k in samples]
-    chosen, found = in_one_chart(points, chart, lambda model: model.state_space)
-    first, (A, B, C, D) = linear_model(chart, points[0], chosen=chosen), zip(*found, strict=True)
+    chosen, found = in_common_coordinates(points, variables, lambda model: model.state_space)
+    first, (A, B, C, D) = linear_model(variables, points[0], chosen=chosen), zip(*found, strict=True)
     return VaryingModel(
         mechanism=first.mechanism, mode=first.mode, about=first.about, states=first.states, inputs=first.inputs,
         outputs=first.outputs, times=np.array([point.time for point in points]), A=np.array(A), B=np.array(B),
-        C=np.array(C), D=np.array(D), nominal=_along(points, chart.coordinates, chosen, chart.ports),
-        coordinates=chart.coordinates, chosen=chosen, ports=chart.ports, modal=first.modal_states,
+        C=np.array(C), D=np.array(D), nominal=_along(points, variables.coordinates, chosen, variables.ports),
+        coordinates=variables.coordinates, chosen=chosen, ports=variables.ports, modal=first.modal_states,
     )  # fmt: skip
 
 
-def in_one_chart(
-    points: Sequence[MotionPoint], chart: Chart, take: Callable[[LinearModel], T]
+def in_common_coordinates(
+    points: Sequence[MotionPoint], variables: ModelVariables, take: Callable[[LinearModel], T]
 ) -> tuple[CoordinateChoice, list[T]]:
     """Linearise at points of a motion in common minimal coordinates, and apply `take` to each linear model.
 
@@ -257,12 +257,12 @@ def in_one_chart(
     SingularPositionError
         No coordinates describe the motion at all points.
     """
-    coordinates, without = chart.coordinates, list[int]()
+    coordinates, without = variables.coordinates, list[int]()
     chosen, tries = coordinates.choose(coordinates.at(points[0])), len(coordinates.measured) + _MORE
     while True:
         first, found = None, []
         for point in points:
-            model = linear_model(chart, point, chosen=chosen)
+            model = linear_model(variables, point, chosen=chosen)
             first = first or model
             if not describes(model.minimal, first.minimal):
                 break
