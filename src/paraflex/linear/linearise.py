@@ -176,9 +176,8 @@ def operating_point(
         joints = [motor.joint for motor in mechanism.motors if motor.name in chosen.motors]
         state = static_equilibrium(system, state, list(dict.fromkeys(joints)))
     own = coordinates_of(system, ports.prescribed, as_enum(FirstCoordinates, coordinates, "coordinates"))
-    return ModelVariables(own, ports, "static equilibrium" if balanced else "a pose at rest"), *resting_point(
-        own, state, chosen
-    )
+    about = "static equilibrium" if balanced else "a pose at rest"
+    return ModelVariables(own, ports, about), *resting_point(own, state, chosen)
 
 
 def linear_model(
