@@ -7,7 +7,6 @@ import json
 import pytest
 
 from paraflex.dynamics import build_system, consistent_state, static_equilibrium
-from paraflex.dynamics.points import tip_deflection
 from paraflex.files import library_file, library_names, load
 from paraflex.mechanism import (
     Assembly,
@@ -21,6 +20,7 @@ from paraflex.mechanism import (
     Section,
     raparm_i,
 )
+from paraflex.results.links import tip_deflection
 from shell import paraflex
 
 PAPER = ("raparm_i", "raparm_ii")

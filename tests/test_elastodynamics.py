@@ -13,7 +13,6 @@ import scipy.optimize
 import twins
 from paraflex import elastodynamics
 from paraflex.dynamics import build_system, constant_signals, pack_signals
-from paraflex.dynamics.points import tip_deflection
 from paraflex.elastodynamics import simulate_ked
 from paraflex.errors import ActuationError, InputError, IntegrationError
 from paraflex.fem import ReferenceCondition
@@ -35,6 +34,7 @@ from paraflex.mechanism import (
     Section,
 )
 from paraflex.results import tracking_dataset
+from paraflex.results.links import tip_deflection
 from paraflex.tracking import plan_tracking
 
 LENGTH, WIDTH, THICKNESS = 0.4, 0.02, 0.004

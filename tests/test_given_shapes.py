@@ -10,7 +10,7 @@ from conftest import RUBBER
 from paraflex import plots
 from paraflex.cli.inspect import describe
 from paraflex.dynamics import build_system, consistent_state, static_equilibrium
-from paraflex.dynamics.points import point_motion, tip_deflection
+from paraflex.dynamics.points import point_motion
 from paraflex.dynamics.state import mass_matrix
 from paraflex.elastodynamics import simulate_ked
 from paraflex.engines.exudyn import simulate_exudyn
@@ -52,6 +52,7 @@ from paraflex.mechanism import (
 )
 from paraflex.motion import simulate_motion
 from paraflex.results import tracking_dataset
+from paraflex.results.links import tip_deflection
 from paraflex.results.record import record
 from paraflex.studies import verify
 from paraflex.tracking import plan_tracking

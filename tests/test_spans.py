@@ -10,7 +10,6 @@ import scipy.optimize
 
 from paraflex.cli.inspect import describe
 from paraflex.dynamics import build_system, consistent_state, static_equilibrium
-from paraflex.dynamics.points import tip_deflection
 from paraflex.errors import InputError
 from paraflex.fem import ReferenceCondition
 from paraflex.files import load
@@ -28,6 +27,7 @@ from paraflex.mechanism import (
     Section,
     finite_segments,
 )
+from paraflex.results.links import tip_deflection
 from shell import paraflex
 from test_segments import first_frequency
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from paraflex.dynamics import build_system, consistent_state, pack_signals
-from paraflex.dynamics.points import point_motion, tip_deflection
+from paraflex.dynamics.points import point_motion
 from paraflex.errors import IntegrationError
 from paraflex.fem import ReferenceCondition
 from paraflex.files import library_file, load
@@ -24,6 +24,7 @@ from paraflex.mechanism import (
     Section,
 )
 from paraflex.motion import simulate_motion
+from paraflex.results.links import tip_deflection
 
 RAMP, LENGTH = 15.0, 10.0
 AXIAL_STIFFNESS, MASS_PER_LENGTH = 2.8e7, 1.2

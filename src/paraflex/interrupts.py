@@ -9,18 +9,14 @@ import os
 import signal
 import sys
 import threading
-from collections.abc import Callable, Iterator
-from concurrent.futures import Future
-from contextlib import contextmanager, suppress
-from queue import Empty, SimpleQueue
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Any
 
 # Windows has no SIGHUP, but SIGBREAK for Ctrl-Break.
 ENDING = tuple(
     signal.Signals[name] for name in ("SIGINT", "SIGTERM", "SIGHUP", "SIGBREAK") if name in signal.Signals.__members__
 )
-# Exit code of a process whose parent has ended; no process reads it.
-_ORPHANED = 1
 
 
 @contextmanager
@@ -50,34 +46,6 @@ def uninterrupted() -> Iterator[list[int]]:
 def _answer(how: dict[signal.Signals, Any]) -> None:
     for number, answer in how.items():
         signal.signal(number, answer)
-
-
-class Calls:
-    """Calls submitted to a pool of threads or processes by a thread that signals may interrupt at any time.
-
-    Pools and futures acquire their locks in Python code. An exception raised there by a signal handler would leave a
-    lock acquired, and the workers and their caller would wait for ever. Signals are therefore deferred while a call is
-    submitted, and results are awaited with a queue that does not leave its lock acquired.
-    """
-
-    def __init__(self) -> None:
-        self._done: SimpleQueue[Future[Any]] = SimpleQueue()
-
-    def submit(self, submit: Callable[..., Future[Any]], *arguments: Any) -> Future[Any]:
-        """Submit a call with signals deferred, and return the future that `submit` returns."""
-        with uninterrupted():
-            future = submit(*arguments)
-            future.add_done_callback(self._done.put)
-        return future
-
-    def done(self) -> set[Future[Any]]:
-        """Return the futures that ended since the last call; wait at most 1 s for one, so that Ctrl-C gets through."""
-        ended = set()
-        with suppress(Empty):
-            ended.add(self._done.get(timeout=1.0))
-            while True:
-                ended.add(self._done.get_nowait())
-        return ended
 
 
 @contextmanager
@@ -133,8 +101,8 @@ def end_with_parent(pipe: int | None = None) -> None:
             os.read(pipe, 1)
         elif parent is not None:
             wait([parent.sentinel])
-        # `sys.exit` would end this thread alone; no clean-up is needed.
-        os._exit(_ORPHANED)
+        # `sys.exit` would end this thread alone; no clean-up is needed, and no process reads the exit code.
+        os._exit(1)
 
     if pipe is not None or parent is not None:
         threading.Thread(target=watch, name="paraflex-parent", daemon=True).start()

@@ -478,7 +478,7 @@ def _drive_and_hold(
     columns = [task.mechanism.motors.index(motor) for motor in motors]
 
     def whole(held: Solution) -> TrackingRun:
-        solution = driven.followed_by(held, count, held.multipliers[:, own], braked.energy)
+        solution = _joined(driven, held, count, held.multipliers[:, own], braked.energy)
         holding = np.zeros((held.t.size, len(task.mechanism.motors)))
         holding[:, columns] = braked.holding(held.multipliers)
         # The state at an event is one sample more than the times of the task.
@@ -491,6 +491,45 @@ def _drive_and_hold(
         error.partial = whole(with_likely_cause(error, (task.whole or task).mechanism).partial)
         raise
     return whole(held)
+
+
+def _joined(driven: Solution, held: Solution, samples: int, multipliers: Array, energy: float) -> Solution:
+    """Join a run and its continuation from its last state, after brakes have absorbed energy.
+
+    Parameters
+    ----------
+    driven, held : Solution
+        Run and its continuation, with the same coordinates.
+    samples : int
+        Number of samples of the run that are kept.
+    multipliers : (k, m) array
+        Multipliers of the continuation, one per row of the run's system [N, N m].
+    energy : float
+        Energy absorbed by the brakes [J].
+    """
+    gained = driven.kinetic_energy[-1] + driven.strain_energy[-1] - driven.kinetic_energy[0] - driven.strain_energy[0]
+    before, known = driven.work[-1], {one.place for one in driven.findings}
+    arrays = {
+        name: np.concatenate([getattr(driven, name)[:samples], getattr(held, name)])
+        for name in ("t", "q", "v", "a", "kinetic_energy", "strain_energy")
+    }
+    counts = ("steps", "rejected", "newton_iterations", "factorisations", "evaluations", "wall_time")
+    maxima = ("constraint_position_max", "constraint_velocity_max")
+    return replace(
+        held,
+        **arrays,
+        multipliers=np.concatenate([driven.multipliers[:samples], multipliers]),
+        work=np.concatenate([driven.work[:samples], held.work + before - energy]),
+        **{name: getattr(driven, name) + getattr(held, name) for name in counts},
+        **{name: max(getattr(driven, name), getattr(held, name)) for name in maxima},
+        # The imbalance of the continuation is relative to its start.
+        energy_balance_max=max(driven.energy_balance_max, abs(gained - before) + held.energy_balance_max),
+        singular_positions=driven.singular_positions + held.singular_positions,
+        brake_energy=energy,
+        # Locked joints have rows that the run does not have.
+        multiplier_errors=driven.multiplier_errors,
+        findings=driven.findings + tuple(one for one in held.findings if one.place not in known),
+    )
 
 
 def _start(system: System, motion: RigidMotion) -> State:

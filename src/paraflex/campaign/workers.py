@@ -18,12 +18,14 @@ from concurrent.futures import (
     ProcessPoolExecutor,
     ThreadPoolExecutor,
 )
+from contextlib import suppress
 from importlib import import_module
 from itertools import islice
+from queue import Empty, SimpleQueue
 from typing import Any, TypeVar
 
 from paraflex.errors import InputError, ParaflexError, optional_package, suggestion
-from paraflex.interrupts import Calls, end_with_parent, starting_processes, uninterrupted
+from paraflex.interrupts import end_with_parent, starting_processes, uninterrupted
 
 THREADS = "threads"
 PROCESSES = "processes"
@@ -41,6 +43,34 @@ _SWITCH = 2e-4
 
 T = TypeVar("T")
 R = TypeVar("R")
+
+
+class Calls:
+    """Calls submitted to a pool of threads or processes by a thread that signals may interrupt at any time.
+
+    Pools and futures acquire their locks in Python code. An exception raised there by a signal handler would leave a
+    lock acquired, and the workers and their caller would wait for ever. Signals are therefore deferred while a call is
+    submitted, and results are awaited with a queue that does not leave its lock acquired.
+    """
+
+    def __init__(self) -> None:
+        self._done: SimpleQueue[Future[Any]] = SimpleQueue()
+
+    def submit(self, submit: Callable[..., Future[Any]], *arguments: Any) -> Future[Any]:
+        """Submit a call with signals deferred, and return the future that `submit` returns."""
+        with uninterrupted():
+            future = submit(*arguments)
+            future.add_done_callback(self._done.put)
+        return future
+
+    def done(self) -> set[Future[Any]]:
+        """Return the futures that ended since the last call; wait at most 1 s for one, so that Ctrl-C gets through."""
+        ended = set()
+        with suppress(Empty):
+            ended.add(self._done.get(timeout=1.0))
+            while True:
+                ended.add(self._done.get_nowait())
+        return ended
 
 
 class LostWorker(ParaflexError):

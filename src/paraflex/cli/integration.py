@@ -4,8 +4,9 @@ from collections.abc import Sequence
 from dataclasses import asdict
 from typing import Any
 
-from paraflex.cli.commands.requests import conflict, flags
+from paraflex.cli.commands.requests import flags
 from paraflex.cli.commands.runs import RunRequest
+from paraflex.cli.request import conflict
 from paraflex.cli.stops import number_in_option, parse_event
 from paraflex.errors import InputError
 from paraflex.files import StudyDefaults

@@ -9,10 +9,11 @@ import numpy as np
 from paraflex.checks import BALANCED
 from paraflex.cli.commands.models import LinearRequest
 from paraflex.cli.commands.options import PlanChoice
-from paraflex.cli.commands.requests import conflict, flagged
+from paraflex.cli.commands.requests import flagged
 from paraflex.cli.request import (
     check_time,
     command_provenance,
+    conflict,
     find_modes,
     find_path,
     locating_errors,

@@ -162,3 +162,8 @@ def located_error(error: InputError, model: Model) -> InputError:
     if error.field in flags:
         return error.at(flags[error.field])
     return error.in_file(model.source)
+
+
+def conflict(problem: str, flag: str, value: object) -> InputError:
+    """Return the error of an option that does not go with another."""
+    return InputError(problem, field=flag, value=value, remedy="leave one of them out")

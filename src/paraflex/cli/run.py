@@ -6,12 +6,12 @@ from dataclasses import asdict
 from pathlib import Path
 
 from paraflex.cli.along import run_along
-from paraflex.cli.commands.requests import conflict, flagged
+from paraflex.cli.commands.requests import flagged
 from paraflex.cli.commands.runs import RunRequest
 from paraflex.cli.integration import given_flags, integration_options
 from paraflex.cli.motion import run_motion
 from paraflex.cli.replacing import hold_results
-from paraflex.cli.request import find_modes, find_paths, requested_model, with_frames
+from paraflex.cli.request import conflict, find_modes, find_paths, requested_model, with_frames
 from paraflex.cli.stops import check_stops
 from paraflex.errors import InputError
 from paraflex.files import Model

@@ -1,7 +1,8 @@
 """`paraflex statics`: static equilibria under loads and travel, applied in steps."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import partial
 
 import numpy as np
 import xarray as xr
@@ -20,8 +21,6 @@ from paraflex.files import Model
 from paraflex.files.fields import number_in
 from paraflex.formatting import number, quantity
 from paraflex.results.statics_data import statics_dataset, statics_summary
-
-_NONE = "none"
 
 
 def statics_command(request: StaticsRequest) -> int:
@@ -56,19 +55,13 @@ def _requested(model: Model, request: StaticsRequest) -> StaticsDefaults:
 
     All other arguments that are not given are the model's as well.
     """
-    mechanism = model.mechanism
+    mechanism, coordinate = model.mechanism, partial(coordinate_named, model.mechanism)
     units = dict(zip([motor.name for motor in mechanism.motors], mechanism.motor_units(), strict=True))
     with flagged(request, first=True):
-        loads, moved = (
-            {name: _in_unit(text, getattr(coordinate_named(mechanism, name, f"{field}.{name}"), unit), f"{flag} {name}")
-             for name, text in _pairs(getattr(request, field), flag).items()}
-            for field, flag, unit in (("loads", "--load", "effort_unit"), ("moved", "--move", "unit"))
-        )  # fmt: skip
-        torques = {
-            name: _in_unit(text, units.get(name, "N m"), f"--torque {name}")
-            for name, text in _pairs(request.torques, "--torque").items()
-        }
-        held = () if request.held == [_NONE] else request.held
+        loads = _quantities(request.loads, "--load", lambda name: coordinate(name, f"loads.{name}").effort_unit)
+        moved = _quantities(request.moved, "--move", lambda name: coordinate(name, f"moved.{name}").unit)
+        torques = _quantities(request.torques, "--torque", lambda name: units.get(name, "N m"))
+        held = () if request.held == ["none"] else request.held
         requested = model.statics.filled(
             loads=loads or None, torques=torques or None, moved=moved or None, held=held, steps=request.steps,
             stiffness=request.stiffness, buckling=request.buckling,
@@ -80,22 +73,22 @@ def _requested(model: Model, request: StaticsRequest) -> StaticsDefaults:
     return requested.filled(stiffness=tuple(f"{effector.point}.{axis}" for axis in effector.coordinates))
 
 
-def _pairs(given: Sequence[str], flag: str) -> dict[str, str]:
-    """Return values by name; raise InputError if a name is given twice."""
-    found: dict[str, str] = {}
+def _quantities(given: Sequence[str], flag: str, unit_of: Callable[[str], str]) -> dict[str, float]:
+    """Return values by name, each in its SI unit; raise InputError if a name is given twice."""
+    texts: dict[str, str] = {}
     for text in given:
         name, equals, value = (part.strip() for part in text.partition("="))
         if not (name and equals and value):
             raise InputError("not NAME=VALUE", field=flag, value=text, remedy=f'write {flag} "stage.T.x=1"')
-        if name in found:
+        if name in texts:
             raise InputError("given twice", field=flag, value=name, remedy="leave one of them out")
-        found[name] = value
-    return found
-
-
-def _in_unit(text: str, unit: str, field: str) -> float:
-    with renamed(field):
-        return number_in(text, unit)
+        texts[name] = value
+    values = {}
+    for name, text in texts.items():
+        unit = unit_of(name)
+        with renamed(f"{flag} {name}"):
+            values[name] = number_in(text, unit)
+    return values
 
 
 def _print_statics(out: PlainConsole, data: xr.Dataset) -> None:
@@ -115,9 +108,8 @@ def _lines(data: xr.Dataset, summary: dict) -> list[str]:
     for name, word in equilibria.lowest_frequencies(data).items():
         kept = "moved coordinates released" if word == "free" else "held and moved coordinates fixed"
         values = last[name].values[np.isfinite(last[name].values)]
-        known = ", ".join(map(number, values))
         kept += ", 0 for growing motions" if np.any(values == 0.0) else ""
-        lines.append(f"{'free ' if word == 'free' else ''}frequencies: {known} Hz, {kept}")
+        lines.append(f"{'free ' if word == 'free' else ''}frequencies: {', '.join(map(number, values))} Hz, {kept}")
     if words := equilibria.buckling_words(data):
         lines.append(f"buckling at {words}")
     elif words := equilibria.no_buckling(data):

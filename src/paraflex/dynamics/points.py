@@ -1,11 +1,11 @@
-"""Motion of named points, beam tips and deflections from chords, from coordinates over time (k, n)."""
+"""Motion of named points and deflections from chords, from coordinates over time (k, n)."""
 
 from typing import NamedTuple
 
 import numpy as np
 
 from paraflex.arrays import Array
-from paraflex.dynamics.coordinates import GROUND_INDEX, Marker, end_markers
+from paraflex.dynamics.coordinates import GROUND_INDEX, Marker
 from paraflex.dynamics.system import System
 from paraflex.mechanism import PointRef
 
@@ -85,28 +85,6 @@ def marker_motion(system: System, marker: Marker, q: Array, v: Array, a: Array) 
         v[:, body.position] + turned(w * quarter_turn(local) + rate),
         a[:, body.position] + turned(dw * quarter_turn(local) - w**2 * local + 2.0 * w * quarter_turn(rate) + second),
     )
-
-
-def tip_deflection(system: System, name: str, q: Array) -> Array:
-    """Return axial [m] and transverse [m] displacement and slope [rad] of a beam's last end: (k, 3).
-
-    Displacements count from the position of the end on the straight beam along its tangent at the first end, whatever
-    its reference condition. They are zero for a body without flexible coordinates. The axial displacement is the
-    stretch, less the shortening by bending for second-order geometry. For a modal body, the columns are displacements
-    along x and y and rotation of its last point relative to its first; NaN if it has no two distinct points.
-    """
-    body = system.body(name)
-    if body.nf == 0:
-        return np.zeros((q.shape[0], 3))
-    ends = end_markers(system.index[name], body)
-    if not ends:
-        return np.full((q.shape[0], 3), np.nan)
-    u, first, last = q[:, body.flexible], ends[0], ends[-1]
-    chord = last.relative_to(first)
-    apart, root = chord.place(u), u @ first.slope
-    cos, sin = np.cos(root), np.sin(root)
-    along = np.column_stack([cos * apart[:, 0] + sin * apart[:, 1], cos * apart[:, 1] - sin * apart[:, 0]])
-    return np.column_stack([along - chord.x0, u @ last.slope - root])
 
 
 def across_chord(stations: Array, rest: Array) -> Array:

@@ -13,7 +13,6 @@ from paraflex.fem.foreshortening import (
     mass_points as mass_points,
     node_weights as node_weights,
     slope_square_integrals as slope_square_integrals,
-    slope_squares as slope_squares,
 )
 from paraflex.fem.integrals import (
     Lump as Lump,

@@ -63,14 +63,13 @@ def mass_points(mesh: BeamMesh, spans: Sequence[SpanProperties], lumps: Sequence
     n, g = mesh.n_elements, GAUSS_POINTS
     lengths = np.diff(mesh.nodes)
     x, mass, rows, slopes = [], [], [], []
+    weights = np.zeros((n * g + len(lumps), n * g), dtype=lengths.dtype)
     for e, length in enumerate(lengths):
         local = 0.5 * length * (GAUSS_PLACES + 1.0)
         rows.append(np.stack([mesh.axial_rows(e, local) @ basis, mesh.transverse_rows(e, local) @ basis], axis=1))
         slopes.append(mesh.transverse_rows(e, local, derivative=1) @ basis)
         x.append(mesh.nodes[e] + local)
         mass.append(0.5 * length * GAUSS_WEIGHTS * spans[mesh.spans[e]].mass_per_length)
-    weights = np.zeros((n * g + len(lumps), n * g), dtype=lengths.dtype)
-    for e, length in enumerate(lengths):
         own = slice(e * g, (e + 1) * g)
         weights[own, : e * g] = node_weights(mesh, e)[: e * g]
         weights[own, own] = 0.5 * length * _cumulative(GAUSS_PLACES)
@@ -89,21 +88,8 @@ def mass_points(mesh: BeamMesh, spans: Sequence[SpanProperties], lumps: Sequence
     )
 
 
-def slope_squares(mesh: BeamMesh, basis: Array, x: Array, u: Array) -> Array:
-    """Compute f(x) = int_0^x (N2' u)^2 dx at positions along a beam, exactly: (k, places) [m].
-
-    Parameters
-    ----------
-    mesh, basis, x
-        Mesh, basis and positions: see `slope_square_integrals`.
-    u : (k, nf) array
-        Flexible coordinates.
-    """
-    return slope_square_integrals(mesh, basis, x)(u)
-
-
 def slope_square_integrals(mesh: BeamMesh, basis: Array, x: Array) -> Callable[[Array], Array]:
-    """Return `slope_squares` as a function of the flexible coordinates alone, for repeated calls.
+    """Return f(x) = int_0^x (N2' u)^2 dx [m], exact, as a function of coordinates (k, nf) with values (k, places).
 
     Parameters
     ----------

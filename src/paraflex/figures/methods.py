@@ -1,6 +1,8 @@
 """Charts and tables of integration methods: work and precision, numerical damping."""
 
+from collections import defaultdict
 from collections.abc import Iterator, Mapping, Sequence
+from itertools import count
 from typing import Any
 
 import numpy as np
@@ -33,19 +35,29 @@ def work_precision(figures: Mapping[str, Any]) -> Iterator[Chart]:
     """Yield charts of wall time and accepted steps of every method over its error, on logarithmic axes.
 
     Runs with fixed steps and runs with error control form separate lines; the former have rings. Errors below the
-    uncertainty of the reference are shaded.
+    uncertainty of the reference are shaded; runs of zero error are left out.
     """
-    lines = _lines(figures["methods"])
-    error = [run["error"] for _, _, _, runs in lines for run in runs]
-    for key, axis in (("wall_time", Axis("wall time", "s", log=True)), ("steps", Axis("accepted steps", log=True))):
-        curves = [
-            Curve(name, [run[key] for run in runs], [run["error"] for run in runs], own, mark=mark, line=True)
-            for name, own, mark, runs in lines
-        ]
-        if curves:
-            below = figures["reference"]["uncertainty"]
-            spans = [Span(0.0, below, "below the reference's own")] if min(error) < below < max(error) else []
-            yield Chart(key, "", axis, curves, Axis("largest error of position", "m", log=True), spans=spans)
+    members = defaultdict[str, Iterator[int]](count)
+    curves: dict[str, list[Curve]] = {"wall_time": [], "steps": []}
+    errors: list[float] = []
+    for method in figures["methods"].values():
+        own = Look(next(members[method["family"]]), _FAMILIES[method["family"]][0])
+        done = [run for run in method["runs"] if run["status"] == "complete" and run["error"] > 0.0]
+        for fixed in (False, True):
+            runs = [run for run in done if (run["step"] is not None) == fixed]
+            runs.sort(key=lambda run: -run["error"])
+            name = f"{method['title']}, fixed steps" if fixed else method["title"]
+            mark: Mark = "ring" if fixed else _FAMILIES[method["family"]][1]
+            error = [run["error"] for run in runs]
+            errors += error
+            for key in curves if runs else ():
+                curves[key].append(Curve(name, [run[key] for run in runs], error, own, mark=mark, line=True))
+    if errors:
+        below = figures["reference"]["uncertainty"]
+        spans = [Span(0.0, below, "below the reference's own")] if min(errors) < below < max(errors) else []
+        over = Axis("largest error of position", "m", log=True)
+        yield Chart("wall_time", "", Axis("wall time", "s", log=True), curves["wall_time"], over, spans=spans)
+        yield Chart("steps", "", Axis("accepted steps", log=True), curves["steps"], over, spans=spans)
 
 
 @figure("damping ratio, period error and spectral radius of methods", takes="nothing", height=62.0, curves=_CURVES)
@@ -64,48 +76,22 @@ def numerical_damping(curves: Sequence[tuple[str, int | None]] | None = None) ->
     from paraflex.integrators import METHODS
     from paraflex.integrators.spectra import spectrum
 
-    members: dict[str, int] = {}
+    members = defaultdict[str, Iterator[int]](count)
     found: dict[str, list[Curve]] = {"damping": [], "period": [], "radius": []}
     default = [(one, order) for one in METHODS if one != "ida" for order in _ORDERS.get(one, (None,))]
     for name, order in default if curves is None else curves:
         method = METHODS[name]
-        own = _look(method.family.value, members)
+        own = Look(next(members[method.family.value]), _FAMILIES[method.family.value][0])
         label = method.title if not method.multistep else f"{method.title.split(' ')[0]} {order}"
         low, high = (spectrum(name, frequency, order=order) for frequency in (_RESOLVED, _HIGH))
         for key, values in (("damping", low.damping_ratio), ("period", np.abs(low.period_error))):
             seen = (low.radius < 1.0 + 1e-9) & (values > 0.1 * _SHOWN[0])
             found[key].append(Curve(label, np.where(seen, values, np.nan), low.frequency, own))
-        radius = np.where(high.radius < _GROWN, high.radius, np.nan)
-        found["radius"].append(Curve(label, radius, high.frequency, own))
+        found["radius"].append(Curve(label, np.where(high.radius < _GROWN, high.radius, np.nan), high.frequency, own))
     over, small = Axis("h ω", "rad", log=True), {"log": True, "low": _SHOWN[0], "high": _SHOWN[1]}
     yield Chart("damping", "Damping ratio", Axis("", **small), found["damping"], over)
     yield Chart("period", "Period error, as a fraction", Axis("", **small), found["period"], over)
     yield Chart("radius", "Spectral radius", Axis("", low=0.0, high=_GROWN), found["radius"], over, levels=[1.0])
-
-
-def _lines(methods: Mapping[str, Any]) -> list[tuple[str, Look, Mark, list[dict[str, Any]]]]:
-    """Return name, look, mark and complete runs of each line.
-
-    Runs are ordered by decreasing error; those of zero error are left out.
-    """
-    members: dict[str, int] = {}
-    lines = []
-    for method in methods.values():
-        own = _look(method["family"], members)
-        done = [run for run in method["runs"] if run["status"] == "complete" and run["error"] > 0.0]
-        for fixed in (False, True):
-            runs = [run for run in done if (run["step"] is not None) == fixed]
-            if runs:
-                name = f"{method['title']}, fixed steps" if fixed else method["title"]
-                mark: Mark = "ring" if fixed else _FAMILIES[method["family"]][1]
-                lines.append((name, own, mark, sorted(runs, key=lambda run: -run["error"])))
-    return lines
-
-
-def _look(family: str, members: dict[str, int]) -> Look:
-    """Return the look of the next member of a family."""
-    members[family] = members.get(family, -1) + 1
-    return Look(members[family], _FAMILIES[family][0])
 
 
 # Tables

@@ -16,7 +16,6 @@ from paraflex.mechanism import (
     ModalPoint,
     Polynomial,
     Section,
-    ShapeFunction,
     Sine,
 )
 from paraflex.mechanism.bodies import BODY_KINDS
@@ -58,7 +57,10 @@ def read_body(name: str, body: Any, table: ModelTable) -> Body:
             values[field] = found[0] if isinstance(names, str) else found
     for direction in ("transverse", "axial") if "axial_sines" in values else ():
         sines, polynomials = values.pop(f"{direction}_sines"), values.pop(f"{direction}_polynomials")
-        values[direction] = _functions(sines, polynomials, f"{place}.{direction}_sines")
+        if sines < 0:
+            raise InputError("must not be negative", field=f"{place}.{direction}_sines", value=sines, remedy="give 2")
+        at_most(sines, SHAPE_FUNCTIONS, f"{place}.{direction}_sines")
+        values[direction] = (*(Sine(n + 1) for n in range(sines)), *(Polynomial(tuple(row)) for row in polynomials))
     if body.type == "modal":
         values["points"] = {key: ModalPoint(**dict(point)) for key, point in body.points.items()}
     if body.type == "beam":
@@ -123,10 +125,3 @@ def _damping(table: DampingTable | None, name: str) -> Damping | None:
         value=sorted(given),
         remedy="give ratios alone, or loss_factor and frequency, or mass and stiffness",
     )
-
-
-def _functions(sines: int, polynomials: list[list[float]], field: str) -> tuple[ShapeFunction, ...]:
-    if sines < 0:
-        raise InputError("must not be negative", field=field, value=sines, remedy="give 2")
-    at_most(sines, SHAPE_FUNCTIONS, field)
-    return (*(Sine(n) for n in range(1, sines + 1)), *(Polynomial(tuple(row)) for row in polynomials))

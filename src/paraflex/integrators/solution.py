@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
-
-import numpy as np
 
 from paraflex.arrays import Array, Indices
 from paraflex.findings import Finding
@@ -106,41 +104,3 @@ class Solution:
     def event_time(self) -> float:
         """Time of the event that stopped the run [s]; NaN if there was none."""
         return float(self.t[-1]) if self.event else math.nan
-
-    def followed_by(self, other: Solution, samples: int, multipliers: Array, energy: float) -> Solution:
-        """Join this run and its continuation from its last state, after brakes have absorbed energy.
-
-        Parameters
-        ----------
-        other : Solution
-            Continuation, with the same coordinates.
-        samples : int
-            Number of samples of this run that are kept.
-        multipliers : (k, m) array
-            Multipliers of the continuation, one per row of this run's system [N, N m].
-        energy : float
-            Energy absorbed by the brakes [J].
-        """
-        gained = self.kinetic_energy[-1] + self.strain_energy[-1] - self.kinetic_energy[0] - self.strain_energy[0]
-        before, known = self.work[-1], {one.place for one in self.findings}
-        joined = {
-            name: np.concatenate([getattr(self, name)[:samples], getattr(other, name)])
-            for name in ("t", "q", "v", "a", "kinetic_energy", "strain_energy")
-        }
-        counts = ("steps", "rejected", "newton_iterations", "factorisations", "evaluations", "wall_time")
-        maxima = ("constraint_position_max", "constraint_velocity_max")
-        return replace(
-            other,
-            **joined,
-            multipliers=np.concatenate([self.multipliers[:samples], multipliers]),
-            work=np.concatenate([self.work[:samples], other.work + before - energy]),
-            **{name: getattr(self, name) + getattr(other, name) for name in counts},
-            **{name: max(getattr(self, name), getattr(other, name)) for name in maxima},
-            # The imbalance of the continuation is relative to its start.
-            energy_balance_max=max(self.energy_balance_max, abs(gained - before) + other.energy_balance_max),
-            singular_positions=self.singular_positions + other.singular_positions,
-            brake_energy=energy,
-            # Locked joints have rows that this run does not have.
-            multiplier_errors=self.multiplier_errors,
-            findings=self.findings + tuple(one for one in other.findings if one.place not in known),
-        )

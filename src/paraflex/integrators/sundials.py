@@ -5,7 +5,6 @@ import io
 import math
 from abc import abstractmethod
 from importlib import import_module
-from types import ModuleType
 from typing import Any
 
 import numpy as np
@@ -25,27 +24,14 @@ _TOO_ACCURATE, _ERROR_TESTS = -2, -3
 _LAPACK = 60
 
 
-def load_sundials() -> ModuleType:
-    """Return the package that runs SUNDIALS.
-
-    Raises
-    ------
-    InputError
-        The package is not installed.
-    """
-    problem, remedy = "needs SUNDIALS, which is not installed", "pip install 'paraflex[sundials]'"
-    with optional_package(problem, field="method", remedy=remedy):
-        import_module("sksundae.cvode")
-        import_module("sksundae.ida")
-        return import_module("sksundae")
-
-
 class SundialsStepper(Stepper):
-    """Common base of CVODE and IDA."""
+    """Common base of CVODE and IDA; an `InputError` if SUNDIALS is not installed."""
 
     def __init__(self, form: OdeForm, tolerances: Array, steps: Steps) -> None:
         super().__init__(form, tolerances, steps)
-        self._package = load_sundials()
+        problem, remedy = "needs SUNDIALS, which is not installed", "pip install 'paraflex[sundials]'"
+        with optional_package(problem, field="method", remedy=remedy):
+            self._cvode, self._ida = import_module("sksundae.cvode"), import_module("sksundae.ida")
         self._counts, self._matrices, self._last = SolverCounts(0, 0, 0, 0), 0, np.zeros(1)
 
     def begin(self, t: float, y: Array, stop: float) -> None:
@@ -106,7 +92,7 @@ class CvodeStepper(SundialsStepper):
         self._method = method.solver
 
     def _started(self, t: float, y: Array, options: dict[str, Any]) -> Any:
-        solver = self._package.cvode.CVODE(self._rates, method=self._method, jacfn=self._jacobian, **options)
+        solver = self._cvode.CVODE(self._rates, method=self._method, jacfn=self._jacobian, **options)
         solver.init_step(t, y)
         return solver
 
@@ -128,7 +114,7 @@ class IdaStepper(SundialsStepper):
 
     def _started(self, t: float, y: Array, options: dict[str, Any]) -> Any:
         algebraic = self._implicit.algebraic.tolist() or None
-        solver = self._package.ida.IDA(self._residual, algebraic_idx=algebraic, jacfn=self._matrix, **options)
+        solver = self._ida.IDA(self._residual, algebraic_idx=algebraic, jacfn=self._matrix, **options)
         solver.init_step(t, y, self._implicit.slopes(t, y))
         return solver
 

@@ -114,11 +114,9 @@ named_in_errors("a damping")(Damping)
 
 def stiffness_proportional(damping: Damping) -> float | None:
     """Return the coefficient beta of D = beta K [s], or None if damping is not proportional to stiffness alone."""
-    if isinstance(damping, LossFactor):
-        return damping.stiffness
-    if isinstance(damping, RayleighDamping) and damping.mass == 0.0:
-        return damping.stiffness
-    return None
+    if isinstance(damping, ModalDamping) or (isinstance(damping, RayleighDamping) and damping.mass != 0.0):
+        return None
+    return damping.stiffness
 
 
 def stiffness_damping(damping: Damping | None, what: str, field: str) -> float:

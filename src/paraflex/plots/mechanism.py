@@ -2,7 +2,6 @@
 
 from dataclasses import replace
 from itertools import pairwise
-from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -19,8 +18,6 @@ from paraflex.plots.style import BLACK
 from paraflex.plots.themes import theme
 from paraflex.results.outlines import figure_order
 
-POINT_STYLE: dict[str, Any] = {"linestyle": "none", "marker": "o", "markersize": 2.5, "color": BLACK, "zorder": 3.0}
-_IN_LEGEND: dict[str, Any] = {"linestyle": "none", "marker": "^", "markerfacecolor": "none", "markeredgecolor": BLACK}
 _LOOK = replace(theme("light"), ink=BLACK, earth=BLACK, links=("#737373",))
 # Millimetres per metre, and number of samples of a run from which the travel of sliding joints is found.
 _MM, _POSES = 1e3, 61
@@ -65,10 +62,10 @@ def draw_mechanism(axes: Axes, data: xr.Dataset, clear_of: Array) -> None:
         sketch.marks["pin"].set_label("joints")
     grounds = [mark.places[0] for mark in still_marks(shown, shown.limits)]
     if grounds:
-        axes.plot([], [], label="ground", **_IN_LEGEND)
+        axes.plot([], [], label="ground", linestyle="none", marker="^", markerfacecolor="none", markeredgecolor=BLACK)
     others = [group[0] for group in groups if group[0] not in joined]
     if others:
-        axes.plot(*start[others].T, label="other points", **POINT_STYLE)
+        axes.plot(*start[others].T, "o", label="other points", markersize=2.5, color=BLACK, zorder=3.0)
     taken = np.vstack([*(_sampled(figure_of(places[:1])) for places in shown.bodies.values()), *grounds, clear_of])
     taken = taken[np.isfinite(taken).all(axis=1)]
     axes.update_datalim(np.vstack([start, taken]))

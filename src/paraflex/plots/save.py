@@ -1,6 +1,7 @@
 """Writing of figures: those that accompany the results of a command, and single figures for print."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, TextIO
 
@@ -8,8 +9,9 @@ import xarray as xr
 from matplotlib.figure import Figure
 
 from paraflex.arguments import checked_arguments
-from paraflex.errors import InputError, suggestion
+from paraflex.errors import InputError
 from paraflex.folders import added_to
+from paraflex.mechanism.quantities import all_known
 from paraflex.plots.layout import column_width
 from paraflex.plots.planned import PlannedFigure, drawings, figures_of
 from paraflex.plots.sources import Source, kind_of_numbers
@@ -58,14 +60,12 @@ def save_figures(results: xr.Dataset | Mapping[str, Any], folder: str | Path, mo
     if not kind:
         raise InputError("not the numbers of a result", field="results", remedy="give what its to_dict() returns")
     source = Source(kind, results, folder)
-    written: list[Path] = []
-    with added_to(folder) as new:
-        for figure in figures_of(source, written=True):
-            for drawing in drawings(source, figure, [mode] if mode is not None and figure.takes == "mode" else ()):
-                one_of_many = figure.takes in ("models", "run")
-                stem = portable_name(f"{figure.written_as}_{drawing.of}" if one_of_many else figure.written_as)
-                written += _write(drawing.draw(), [new / f"{stem}.{suffix}" for suffix in ("png", "svg")])
-    return [folder / file.name for file in written]
+    drawn = []
+    for figure in figures_of(source, written=True):
+        named, one_of_many = replace(figure, name=figure.written_as), figure.takes in ("models", "run")
+        for drawing in drawings(source, figure, [mode] if mode is not None and figure.takes == "mode" else ()):
+            drawn.append(replace(drawing, figure=named, of=drawing.of if one_of_many else ""))
+    return write_figures(drawn, folder, ("png", "svg"), dpi=None, force=True)
 
 
 def write_figures(
@@ -74,10 +74,10 @@ def write_figures(
     formats: Sequence[str] = ("pdf",),
     *,
     style: str | None = None,
-    dpi: float = 300.0,
+    dpi: float | None = 300.0,
     force: bool = False,
 ) -> list[Path]:
-    """Draw figures for print and write them, each whole or not at all.
+    """Draw figures and write them, each whole or not at all.
 
     Parameters
     ----------
@@ -89,8 +89,8 @@ def write_figures(
         File formats from FIGURE_FORMATS; PDF by default.
     style : str, optional
         Width of the figures, "single" or "double" column; by default each figure has its own width.
-    dpi : float
-        Resolution of PNG files [dots per inch].
+    dpi : float, optional
+        Resolution of PNG files [dots per inch]; that of the figure if None.
     force : bool
         Whether files of the same names are overwritten; by default they raise an error.
 
@@ -104,9 +104,7 @@ def write_figures(
     InputError
         A format is unknown, or a file exists and `force` is False.
     """
-    for name in formats or ("",):
-        if name not in FIGURE_FORMATS:
-            raise InputError("unknown format", field="--format", value=name, remedy=suggestion(name, FIGURE_FORMATS))
+    all_known(formats or ("",), FIGURE_FORMATS, "--format", "format")
     files = {drawing.stem: [folder / f"{portable_name(drawing.stem)}.{name}" for name in formats] for drawing in drawn}
     there = [file for each in files.values() for file in each if file.exists()]
     if there and not force:
@@ -116,20 +114,14 @@ def write_figures(
             field=str(there[0]),
             remedy="add --force to write over it, or name another --output",
         )
-    written: list[Path] = []
     with added_to(folder) as new:
         for drawing in drawn:
             with column_width(style):
                 figure = drawing.draw()
-            written += _write(figure, [new / file.name for file in files[drawing.stem]], dpi)
-    return [folder / file.name for file in written]
-
-
-def _write(figure: Figure, files: list[Path], dpi: float | None = None) -> list[Path]:
-    for path in files:
-        with whole_file(path, field=str(path.parent)) as unfinished:
-            write_figure(figure, unfinished, path.suffix[1:], dpi)
-    return files
+            for file in files[drawing.stem]:
+                with whole_file(new / file.name, field=str(new)) as unfinished:
+                    write_figure(figure, unfinished, file.suffix[1:], dpi)
+    return [file for drawing in drawn for file in files[drawing.stem]]
 
 
 def write_figure(figure: Figure, file: Path | TextIO, format_name: str, dpi: float | None = None) -> None:

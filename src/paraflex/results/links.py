@@ -15,7 +15,7 @@ from paraflex.dynamics.joint_loads import (
     load_errors,
     undetermined_loads,
 )
-from paraflex.dynamics.points import PointMotion, marker_motion, point_motion, tip_deflection
+from paraflex.dynamics.points import PointMotion, marker_motion, point_motion
 from paraflex.dynamics.sections import Sections
 from paraflex.integrators import Solution
 from paraflex.mechanism import FIRST_END, LAST_END, PointRef
@@ -194,3 +194,25 @@ def _tip(system: System, names: Sequence[str], q: Array) -> Array:
     x, y = (last.position - first.position).T
     length = sum(system.marker(PointRef(name, LAST_END)).x0[0] for name in names)
     return np.column_stack([c * x + s * y - length, c * y - s * x, end - phi])
+
+
+def tip_deflection(system: System, name: str, q: Array) -> Array:
+    """Return axial [m] and transverse [m] displacement and slope [rad] of a beam's last end: (k, 3).
+
+    Displacements count from the position of the end on the straight beam along its tangent at the first end, whatever
+    its reference condition. They are zero for a body without flexible coordinates. The axial displacement is the
+    stretch, less the shortening by bending for second-order geometry. For a modal body, the columns are displacements
+    along x and y and rotation of its last point relative to its first; NaN if it has no two distinct points.
+    """
+    body = system.body(name)
+    if body.nf == 0:
+        return np.zeros((q.shape[0], 3))
+    ends = end_markers(system.index[name], body)
+    if not ends:
+        return np.full((q.shape[0], 3), np.nan)
+    u, first, last = q[:, body.flexible], ends[0], ends[-1]
+    chord = last.relative_to(first)
+    apart, root = chord.place(u), u @ first.slope
+    cos, sin = np.cos(root), np.sin(root)
+    along = np.column_stack([cos * apart[:, 0] + sin * apart[:, 1], cos * apart[:, 1] - sin * apart[:, 0]])
+    return np.column_stack([along - chord.x0, u @ last.slope - root])

@@ -19,6 +19,11 @@ def finite_or_none(value: float) -> float | None:
     return float(value) if math.isfinite(value) else None
 
 
+def plain(value: Any) -> Any:
+    """Return a value for JSON, None for a float that is not finite."""
+    return finite_or_none(value) if isinstance(value, float) else value
+
+
 def largest(values: Array) -> float | None:
     """Return the largest finite magnitude, None if there is none."""
     known = np.abs(values[np.isfinite(values)])

@@ -8,7 +8,7 @@ import numpy as np
 
 from paraflex.arrays import Array, Complex, Indices, Numbers
 from paraflex.dynamics import BodyCoordinates, System, across_chord
-from paraflex.fem import slope_squares
+from paraflex.fem import slope_square_integrals
 from paraflex.mechanism import (
     AssumedModesBeam,
     Body,
@@ -132,7 +132,7 @@ def outline_motion(system: System, drawn: Outline, q: Array) -> Array:
     u = q[:, body.flexible]
     local = drawn.places + np.einsum("kn,sin->ksi", u, _rows(system, body, drawn))
     if body.points is not None and body.mesh is not None:
-        local[:, :, 0] -= 0.5 * slope_squares(body.mesh, body.integrals.D, drawn.places[:, 0], u)
+        local[:, :, 0] -= 0.5 * slope_square_integrals(body.mesh, body.integrals.D, drawn.places[:, 0])(u)
     return turned(q[:, body.position], q[:, body.angle], local)
 
 

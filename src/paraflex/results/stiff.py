@@ -15,13 +15,8 @@ from paraflex.dynamics import System, build_system
 from paraflex.dynamics.joint_coordinates import joint_coordinate
 from paraflex.dynamics.signals import no_signals
 from paraflex.errors import InputError, NumericalError
-from paraflex.kernel.constraints import constraint_values, fill_jacobian
-from paraflex.kernel.packed import make_scratch
 from paraflex.mechanism import Mechanism
 from paraflex.results.outlines import Outline
-
-# Positions (k, 2) and angles (k,) of body frames.
-Frames = dict[str, tuple[Array, Array]]
 
 _MOST_STEPS = 8
 # Gap below which joints are closed, far below the rounding of stored positions [sizes of the mechanism, rad].
@@ -38,10 +33,10 @@ def rigid_frames(
     shapes: Mapping[str, Array],
     angle: Callable[[str], Array],
     driven: Mapping[str, Array],
-) -> Frames | None:
+) -> dict[str, tuple[Array, Array]] | None:
     """Return the body frames of the rigid mechanism nearest to shapes, in the least squares of station distances.
 
-    Return None if the rigid mechanism does not close.
+    They are positions (k, 2) and angles (k,) by body. Return None if the rigid mechanism does not close.
 
     Parameters
     ----------
@@ -63,25 +58,19 @@ def rigid_frames(
     start = np.zeros((len(next(iter(shapes.values()))), system.n))
     for one in drawn:
         body = system.body(one.body)
-        start[:, body.position], start[:, body.angle] = _fitted_frame(one, shapes[one.body], angle(one.body))
+        # The undeformed stations are nearest to the shape in this frame.
+        rest, places = one.places @ [1.0, 1j], shapes[one.body] @ [1.0, 1j]
+        centre, middle, phi = places.mean(axis=1), rest.mean(), angle(one.body)
+        turn = np.sum(np.conj(rest - middle) * (places - centre[:, None]), axis=1) * np.exp(-1j * phi)
+        start[:, body.angle] = phi + np.angle(turn)
+        origin = centre - np.exp(1j * start[:, body.angle]) * middle
+        start[:, body.position] = np.stack([origin.real, origin.imag], axis=1)
     if not np.isfinite(start).all():
         return None
     for held in [driven, {}] if driven else [{}]:
-        q = _closed(system, drawn, start, held)
-        if q is not None:
+        if (q := _closed(system, drawn, start, held)) is not None:
             return {body.name: (q[:, body.position], q[:, body.angle]) for body in system.bodies}
     return None
-
-
-def _fitted_frame(one: Outline, shape: Array, angle: Array) -> tuple[Array, Array]:
-    """Return position and angle of the frame in which the undeformed stations are nearest to a shape (k, s, 2)."""
-    z, middle = one.places @ [1.0, 1j], np.mean(one.places @ [1.0, 1j])
-    places = shape @ [1.0, 1j]
-    centre = places.mean(axis=1)
-    turn = np.sum(np.conj(z - middle) * (places - centre[:, None]), axis=1) * np.exp(-1j * angle)
-    angle = angle + np.angle(turn)
-    origin = centre - np.exp(1j * angle) * middle
-    return np.stack([origin.real, origin.imag], axis=1), angle
 
 
 def _closed(system: System, drawn: Sequence[Outline], q: Array, driven: Mapping[str, Array]) -> Array | None:
@@ -116,12 +105,9 @@ def _closed(system: System, drawn: Sequence[Outline], q: Array, driven: Mapping[
 
 def _rows(system: System, q: Array, chosen: Mask, driven: Mapping[str, Array]) -> tuple[Array, Array]:
     """Return the residuals (k, m) of joints and of driven coordinates, and their Jacobian (k, m, n)."""
-    phi, jacobian = np.zeros((len(q), system.m)), np.zeros((len(q), system.m, system.n))
-    signals, scratch = no_signals(system.packed), make_scratch(system.packed)
-    rate, still = np.zeros(system.m), q[0] * 0.0
-    for k, one in enumerate(np.ascontiguousarray(q)):
-        constraint_values(system.packed, signals, 0.0, one, still, scratch, phi[k], rate)
-        fill_jacobian(system.packed, one, jacobian[k])
+    signals, poses = no_signals(system.packed), np.ascontiguousarray(q)
+    phi = np.array([system.constraints(signals, 0.0, pose)[0] for pose in poses])
+    jacobian = np.array([system.jacobian(pose) for pose in poses])
     held = [(joint_coordinate(system, name, q), value) for name, value in driven.items()]
     return (
         np.concatenate([phi[:, chosen], *((one.value - value)[:, None] for one, value in held)], axis=1),

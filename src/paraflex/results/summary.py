@@ -13,12 +13,11 @@ from paraflex.results.following import FOLLOWING, ErrorSpan, part_run
 from paraflex.results.kinds import RUN_FIGURES, check_kind
 from paraflex.results.loads import load_figures
 from paraflex.results.metrics import METRICS
-from paraflex.results.numbers import by_label, finite_or_none
+from paraflex.results.numbers import by_label, finite_or_none, plain
 from paraflex.results.reduced_runs import reduced_run_figures
 from paraflex.results.sensors import sensor_figures
 from paraflex.results.traces import data_traces
 
-_COUNTS = ("steps", "rejected", "newton_iterations", "factorisations")
 _FIGURES = (
     *FOLLOWING,
     "brake_energy",
@@ -45,9 +44,8 @@ def summary(data: xr.Dataset, failed: dict[str, str] | None = None) -> dict[str,
     dict
         `modes.<mode>` with tracking errors during the motion, after it and over the whole run, vibration and drift,
         peak_torque and rms_torque per motor, end_effector_final, the solver's figures, validity (None for rigid bodies)
-        and `loads` (see `loads.load_figures`); also `sensors` if the mechanism has sensors (see
-        `sensors.sensor_figures`), `reduction` if its bodies are reduced (see `reduced_runs.reduced_run_figures`), and
-        `controllers` and internal_torque_max [N m] with controllers (see `controllers.controller_figures`).
+        and `loads` (see `load_figures`); also `sensors` of mechanisms with sensors (`sensor_figures`), `reduction` of
+        reduced bodies (`reduced_run_figures`), `controllers` and internal_torque_max [N m] (`controller_figures`).
         `tolerance` [m] of the integration; `error`, the time span of the error that ranks the modes; `verdict`, with
         level and all findings; `after`, the state of the motors after the path; `part`, the part of the path covered by
         runs that ended before it, else None; `parameters`; `version`. Values that a run did not reach are None.
@@ -71,17 +69,14 @@ def summary(data: xr.Dataset, failed: dict[str, str] | None = None) -> dict[str,
         traces = data_traces(run)
         if "deflection" in run:
             numbers["deflection_max"] = finite_or_none(METRICS["deflection_max"].value(traces))
-        numbers |= {key: int(run[key].item()) for key in _COUNTS}
-        for key in ("peak_torque", "rms_torque"):
-            numbers[key] = by_label(run[key], "motor")
+        numbers |= {key: int(run[key].item()) for key in ("steps", "rejected", "newton_iterations", "factorisations")}
+        numbers |= {key: by_label(run[key], "motor") for key in ("peak_torque", "rms_torque")}
         numbers["end_effector_final"] = [finite_or_none(x) for x in run["end_effector"].isel(time=-1).values]
         numbers["actuation_condition_max"] = finite_or_none(METRICS["actuation_condition_max"].value(traces))
-        numbers["validity"] = validity_summary(run)
-        numbers["loads"] = load_figures(run)
+        numbers |= {"validity": validity_summary(run), "loads": load_figures(run)}
         numbers |= sensor_figures(run) | reduced_run_figures(run) | controller_figures(run)
         modes[str(name)] = numbers
-    for name, reason in (failed or {}).items():
-        modes[name] = {"status": "failed", "message": reason}
+    modes |= {name: {"status": "failed", "message": reason} for name, reason in (failed or {}).items()}
     return {
         "mechanism": data.attrs["mechanism"],
         "tolerance": data.attrs.get("tolerance"),
@@ -109,8 +104,7 @@ def motion_summary(data: xr.Dataset) -> dict[str, Any]:
     check_kind(data, "motion")
     reached = np.flatnonzero(np.isfinite(data["angle"].values).all(axis=1))
     last = data.isel(time=reached[-1] if reached.size else 0)
-    numbers: dict[str, Any] = {name: data[name].item() for name in RUN_FIGURES}
-    numbers = {key: finite_or_none(x) if isinstance(x, float) else x for key, x in numbers.items()}
+    numbers = {name: plain(data[name].item()) for name in RUN_FIGURES}
     return {
         "mechanism": data.attrs["mechanism"],
         "status": numbers.pop("status"),

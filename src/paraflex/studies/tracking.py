@@ -13,12 +13,12 @@ import xarray as xr
 
 from paraflex.arguments import CheckedFields, checked_arguments, refused
 from paraflex.campaign import THREADS, OnProgress, Progress, Result, WholeStudy, Workers
+from paraflex.campaign.workers import Calls
 from paraflex.control import ControllerDescription, simulate_controlled
 from paraflex.errors import ControllerError, InputError, IntegrationError, NumericalError
 from paraflex.findings import Finding
 from paraflex.folders import RUN
 from paraflex.integrators import IntegrationOptions
-from paraflex.interrupts import Calls
 from paraflex.mechanism import ActuationMode
 from paraflex.reduced_bodies import size_of
 from paraflex.results import summary, tracking_dataset

@@ -65,16 +65,16 @@ def bending_of(system: System, name: str, solution: Solution) -> Bending:
     shortening = axial = np.full(solution.t.size, np.nan)
     if line.weights.size:
         shortening = 0.5 * slopes**2 @ line.weights
-        axial = _axial_force(system, body, line, solution) / _buckling_load(body, line)
+        # The body, held as by its frame, buckles under an axial force N, where 1 / N is the largest eigenvalue of
+        # W^-1 G W^-1, W = diag(omega), G = int slope^T slope dx: coordinates are modes of stiffness omega^2.
+        largest = np.linalg.norm(np.sqrt(line.weights)[:, None] * line.slopes / body.modes.omega, ord=2) ** 2
+        axial = _axial_force(system, body, line, solution) / (1.0 / largest if largest > 0.0 else np.inf)
     whole = system.carrier(name)[0]
     return Bending(whole, len(system.parts(whole)), body.points is None, given, tangent, slope, shortening, axial)
 
 
 class _Line(NamedTuple):
-    """Stations along a body: weights of an integral over its length [m], slopes and strains per coordinate, E A [N].
-
-    A modal body has no stations.
-    """
+    """Stations along a body: weights of an integral over its length [m], slopes and strains per coordinate, E A [N]."""
 
     weights: Array
     slopes: Array
@@ -83,7 +83,7 @@ class _Line(NamedTuple):
 
 
 def _line(body: BodyCoordinates, described: Body) -> _Line:
-    """Return the Gauss points of a beam, or of a bar of assumed modes."""
+    """Return the Gauss points of a beam, or of a bar of assumed modes; a modal body has no stations."""
     D = body.integrals.D
     if isinstance(described, FlexibleBeam):
         mesh, spans = described.mesh, described.spans
@@ -103,18 +103,7 @@ def _line(body: BodyCoordinates, described: Body) -> _Line:
         strains = shapes.axial_rows(x, derivative=1) @ D[bent:]
         stiffness = span_properties(described.section, described.material).axial_stiffness
         return _Line(weights, slopes, strains, np.full(x.size, stiffness))
-    none = np.zeros(0)
-    return _Line(none, np.zeros((0, body.nf)), np.zeros((0, body.nf)), none)
-
-
-def _buckling_load(body: BodyCoordinates, line: _Line) -> float:
-    """Return the least uniform axial force under which the body buckles, held as by its frame [N].
-
-    Coordinates are modes of stiffness omega^2: 1 / N is the largest eigenvalue of W^-1 G W^-1, W = diag(omega), G = int
-    slope^T slope dx.
-    """
-    largest = np.linalg.norm(np.sqrt(line.weights)[:, None] * line.slopes / body.modes.omega, ord=2) ** 2
-    return float(1.0 / largest) if largest > 0.0 else np.inf
+    return _Line(np.zeros(0), np.zeros((0, body.nf)), np.zeros((0, body.nf)), np.zeros(0))
 
 
 def _axial_force(system: System, body: BodyCoordinates, line: _Line, solution: Solution) -> Array:

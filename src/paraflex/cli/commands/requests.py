@@ -78,7 +78,15 @@ def with_options(request: type, answer: Callable[[Any], int | None]) -> Callable
     def called(**given: Any) -> None:
         raise typer.Exit(answer(filled(request, given)) or 0)
 
-    called.__signature__ = inspect.Signature([_parameter(*each) for each in _options(request)])  # type: ignore[attr-defined]
+    parameters = []
+    for one, kind in _options(request):
+        # None stands for a default made by a factory.
+        default = None if one.default_factory is not MISSING else one.default
+        parameters.append(inspect.Parameter(
+            one.name, inspect.Parameter.KEYWORD_ONLY, annotation=Annotated[kind, one.metadata["shell"]],
+            default=inspect.Parameter.empty if default is MISSING else default,
+        ))  # fmt: skip
+    called.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
     called.__annotations__ = {}
     return called
 
@@ -101,11 +109,6 @@ def flagged(request: object, *, first: bool = False) -> Iterator[None]:
         raise (error if flag is None else error.at(flag)) from None
 
 
-def conflict(problem: str, flag: str, value: object) -> InputError:
-    """Return the error of an option that does not go with another."""
-    return InputError(problem, field=flag, value=value, remedy="leave one of them out")
-
-
 def _options(request: Any) -> Iterator[tuple[Field[Any], Any]]:
     """Yield the options of a request and their types in order, with those of nested requests in their place."""
     kinds = get_type_hints(request)
@@ -114,15 +117,6 @@ def _options(request: Any) -> Iterator[tuple[Field[Any], Any]]:
             yield from _options(kinds[one.name])
         else:
             yield one, kinds[one.name]
-
-
-def _parameter(one: Field[Any], kind: Any) -> inspect.Parameter:
-    # None stands for a default made by a factory.
-    default = None if one.default_factory is not MISSING else one.default
-    return inspect.Parameter(
-        one.name, inspect.Parameter.KEYWORD_ONLY, annotation=Annotated[kind, one.metadata["shell"]],
-        default=inspect.Parameter.empty if default is MISSING else default,
-    )  # fmt: skip
 
 
 def filled(request: Any, given: dict[str, Any]) -> Any:

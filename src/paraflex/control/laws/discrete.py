@@ -59,19 +59,6 @@ class DiscreteModel(Law, title="state space"):
         return LinearLaw(self.A, self.B, self.C, self.D)
 
 
-def discrete_model(given: Any) -> DiscreteModel:
-    """Return a model of python-control or SciPy as a control law.
-
-    Raises
-    ------
-    InputError
-        A continuous model, or one with numbers that are not finite.
-    """
-    check_discrete(given.dt, given, "law", "model")
-    labels = [_own_names(getattr(given, name, None)) for name in ("input_labels", "output_labels")]
-    return DiscreteModel(*matrices_of(given), None if given.dt is True else float(given.dt), *labels)
-
-
 def is_model(given: Any) -> bool:
     """Whether an object is a state space or a transfer function of python-control or SciPy."""
     return hasattr(given, "dt") and (hasattr(given, "to_ss") or all(hasattr(given, name) for name in "ABCD"))
@@ -133,9 +120,3 @@ def matrices_of(model: Any) -> StateSpace:
     if not all(np.all(np.isfinite(each)) for each in found):
         raise InputError("holds numbers that are not finite", field="model", remedy="look at how it was computed")
     return found
-
-
-def _own_names(labels: Sequence[str] | None) -> tuple[str, ...]:
-    """Return labels given by the user; none if they are python-control's defaults such as u[0] and y[0]."""
-    names = tuple(labels or ())
-    return () if any(name[:2] in ("u[", "y[") for name in names) else names

@@ -17,7 +17,7 @@ import scipy
 from paraflex.arguments import checked_arguments
 from paraflex.arrays import Array
 from paraflex.control.laws.controllers import Plant
-from paraflex.control.laws.discrete import DiscreteModel, discrete_model, is_model
+from paraflex.control.laws.discrete import DiscreteModel, check_discrete, is_model, matrices_of
 from paraflex.control.laws.estimators import rounded
 from paraflex.control.laws.law import Law, StartedLaw
 from paraflex.control.loop.amplifiers import largest_commands
@@ -307,7 +307,7 @@ def as_law(given: Any) -> Any:
     """
     # Models of SciPy have a method "step" as well, their step response.
     if is_model(given):
-        return discrete_model(given)
+        return _discrete_model(given)
     if isinstance(given, Law) or (callable(getattr(given, "step", None)) and not inspect.isclass(given)):
         return given
     if callable(given) and not inspect.isclass(given):
@@ -316,6 +316,21 @@ def as_law(given: Any) -> Any:
         "is not a control law", field="law", value=given,
         remedy="give a function of (k, t, y), an object with a method step, or a discrete model",
     )  # fmt: skip
+
+
+def _discrete_model(given: Any) -> DiscreteModel:
+    """Return a model of python-control or SciPy as a control law.
+
+    Raises
+    ------
+    InputError
+        A continuous model, or one with numbers that are not finite.
+    """
+    check_discrete(given.dt, given, "law", "model")
+    labels = [tuple(getattr(given, name, None) or ()) for name in ("input_labels", "output_labels")]
+    # Labels such as u[0] and y[0] are python-control's defaults, not names.
+    names = [() if any(label[:2] in ("u[", "y[") for label in each) else each for each in labels]
+    return DiscreteModel(*matrices_of(given), None if given.dt is True else float(given.dt), *names)
 
 
 def _filter_model(given: tuple[Array, Array], period: float) -> StateSpace:

@@ -18,7 +18,7 @@ from paraflex.designs.sweep import SweepStudy, SweptResult, make_study
 from paraflex.errors import InputError, optional_package, suggestion
 from paraflex.limits import DESIGNS, at_most
 from paraflex.results.metrics import METRICS
-from paraflex.results.numbers import finite_or_none
+from paraflex.results.numbers import plain
 from paraflex.results.tables import read_parquet, write_parquet
 from paraflex.studies.optimisation.schema import StudyTable
 from paraflex.writing import GO_ON, write_json
@@ -65,11 +65,8 @@ class IndicesResult(SweptResult):
             .reset_index()
             .reindex(columns=list(_ROW_COLUMNS))
         )
-        plain = [
-            {name: finite_or_none(value) if isinstance(value, float) else value for name, value in row.items()}
-            for row in table.to_dict("records")
-        ]
-        return {"kind": "indices", "name": self.sweep.name, "indices": plain}
+        rows = [{name: plain(value) for name, value in row.items()} for row in table.to_dict("records")]
+        return {"kind": "indices", "name": self.sweep.name, "indices": rows}
 
 
 @dataclass(frozen=True)
