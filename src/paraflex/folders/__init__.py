@@ -16,6 +16,7 @@ from paraflex.folders.kinds import (
     SENSITIVITY as SENSITIVITY,
     STUDY_OF_RUNS as STUDY_OF_RUNS,
     VERIFICATION as VERIFICATION,
+    ResultKind as ResultKind,
 )
 from paraflex.folders.lock import (
     FolderInUseError as FolderInUseError,

@@ -267,7 +267,7 @@ class PointPath(CheckedFields):
             raise InputError("two neighbouring points coincide", field="points", remedy="drop one of them")
 
     @cached_property
-    def _spline(self) -> scipy.interpolate.BSpline:
+    def _spline(self) -> "scipy.interpolate.BSpline":
         points = np.array(self.points)
         chords = np.linalg.norm(np.diff(points[:, :2], axis=0), axis=1)
         return _resting(self.motion_time * np.concatenate([[0.0], np.cumsum(chords)]) / chords.sum(), points)
@@ -366,7 +366,7 @@ class TabulatedPath(CheckedFields):
             )  # fmt: skip
 
     @cached_property
-    def _timed(self) -> scipy.interpolate.BSpline:
+    def _timed(self) -> "scipy.interpolate.BSpline":
         times = np.array(self.times)
         return _resting(times - times[0], np.array(self.points))
 
@@ -423,13 +423,13 @@ class TabulatedPath(CheckedFields):
         return PathMotion(*_rest_to_rest(self._timed, t, self.duration))
 
 
-def _resting(times: Array, points: Array) -> scipy.interpolate.BSpline:
+def _resting(times: Array, points: Array) -> "scipy.interpolate.BSpline":
     """Return the quintic spline through points (k, columns) at times (k,), at rest and unaccelerated at both ends."""
     rest = [(order, np.zeros(points.shape[1])) for order in (1, 2)]
     return scipy.interpolate.make_interp_spline(times, points, k=5, bc_type=(rest, rest))
 
 
-def _rest_to_rest(spline: scipy.interpolate.BSpline, t: Array, end: float) -> Array:
+def _rest_to_rest(spline: "scipy.interpolate.BSpline", t: Array, end: float) -> Array:
     """Return values and two derivatives (3, k, columns) of a spline on [0, end] at times t; at rest outside."""
     t = np.atleast_1d(np.asarray(t, dtype=float))
     inside, x = ((t >= 0.0) & (t <= end))[:, None], np.clip(t, 0.0, end)

@@ -196,7 +196,7 @@ class TabulatedProfile(CheckedFields):
                 )  # fmt: skip
 
     @cached_property
-    def _spline(self) -> scipy.interpolate.BSpline:
+    def _spline(self) -> "scipy.interpolate.BSpline":
         degree = min(_DEGREE, len(self.times) - 1)
         return scipy.interpolate.make_interp_spline(self.times, self.values, k=degree)
 
