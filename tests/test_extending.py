@@ -11,7 +11,7 @@ import processes
 from pages import Block, apply_diff, blocks_of, check_output
 
 # The first line of a definition by name, what modules begin with, or the line between two additions.
-DEFINED = re.compile(r" +(?:class |def |\w+(?:: .*)? = ).*[([{:]$| from __future__ | # \w+$|@@$")
+DEFINED = re.compile(r" +(?:class |def |\w+(?:: .*)? = ).*[([{:]$| \x22{3}.*\x22{3}$| # \w+$|@@$")
 PAGE = Path(__file__).parents[1] / "docs" / "extending.md"
 
 

@@ -35,7 +35,7 @@ def apart(a, b):
 
 def turned_apart(a, b):
     """Largest difference of the platform's angle."""
-    return np.max(np.abs(a.angle[:, -1] - b.angle[:, -1]))
+    return np.max(np.abs(a.links["angle"][:, -1] - b.links["angle"][:, -1]))
 
 
 # Motors at base, at base and elbows, redundant and not; a rigid platform that several loops close at.
