@@ -10,8 +10,8 @@ import paraflex
 import processes
 from pages import Block, apply_diff, blocks_of, check_output
 
-# The first line of a definition by name, what modules begin with, or the line between two additions.
-DEFINED = re.compile(r" +(?:class |def |\w+(?:: .*)? = ).*[([{:]$| \x22{3}.*\x22{3}$| # \w+$|@@$")
+# The first line of a definition by name, or the line between two additions.
+DEFINED = re.compile(r" +(?:class |def |\w+(?:: .*)? = ).*[([{:]$| # \w+$|@@$")
 PAGE = Path(__file__).parents[1] / "docs" / "extending.md"
 
 
