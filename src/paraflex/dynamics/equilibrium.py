@@ -164,7 +164,7 @@ def _sparse_equilibrium(system: System, start: State, held: Sequence[str], motio
     raise AssemblyError(_NO_EQUILIBRIUM, Moment(start.time, 0), q, _HOLD)
 
 
-def _solve(K: "scipy.sparse.csr_matrix", C: "scipy.sparse.csr_matrix", f: Array, r: Array) -> tuple[Array, Array]:
+def _solve(K: scipy.sparse.csr_matrix, C: scipy.sparse.csr_matrix, f: Array, r: Array) -> tuple[Array, Array]:
     """Solve [K, C^T; C, 0] [x; mu] = [f; r]. K is indefinite, so unlike `sparse.Saddle` this does not regularise."""
     size = max(1.0, float(abs(K).max()))
     matrix = scipy.sparse.csc_matrix(scipy.sparse.bmat([[K / size, C.T], [C, None]]))

@@ -65,7 +65,7 @@ class Dependence:
         return out / np.max(np.abs(out * units), axis=1, keepdims=True)
 
 
-def constraint_jacobian(system: System, q: Array) -> "scipy.sparse.csr_matrix":
+def constraint_jacobian(system: System, q: Array) -> scipy.sparse.csr_matrix:
     """Return Phi_q (m, n) at q as a sparse matrix; zero in the rows of springs and dampers."""
     return sparse_jacobian(system, q) if system.m > DENSE_ROWS else scipy.sparse.csr_matrix(system.jacobian(q))
 

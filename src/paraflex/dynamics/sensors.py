@@ -39,11 +39,11 @@ class MotionSamples(NamedTuple):
 class SensorRows(NamedTuple):
     """Sparse derivatives of readings: (sensors, n) by q, v and a, (sensors, m) and (sensors, motors)."""
 
-    q: "scipy.sparse.csr_matrix"
-    v: "scipy.sparse.csr_matrix"
-    a: "scipy.sparse.csr_matrix"
-    multipliers: "scipy.sparse.csr_matrix"
-    torques: "scipy.sparse.csr_matrix"
+    q: scipy.sparse.csr_matrix
+    v: scipy.sparse.csr_matrix
+    a: scipy.sparse.csr_matrix
+    multipliers: scipy.sparse.csr_matrix
+    torques: scipy.sparse.csr_matrix
 
 
 class _Needed:
@@ -335,7 +335,7 @@ def sensor_rows(
     return SensorRows(*(_sparse(kind, values.shape[1]) for kind, values in zip(entries, state, strict=True)))
 
 
-def _sparse(rows: Sequence[tuple[Array, Array]], width: int) -> "scipy.sparse.csr_matrix":
+def _sparse(rows: Sequence[tuple[Array, Array]], width: int) -> scipy.sparse.csr_matrix:
     """Return the matrix of rows given by their columns and the values there."""
     counts = [columns.size for columns, _ in rows]
     columns = np.concatenate([np.zeros(0, int), *(columns for columns, _ in rows)])

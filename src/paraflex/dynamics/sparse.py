@@ -54,7 +54,7 @@ def body_masses(system: System, q: Array) -> list[Array]:
     return [forces[: 3 + body.nf, body.all].T for body in system.bodies]
 
 
-def sparse_mass(system: System, q: Array) -> "scipy.sparse.csr_matrix":
+def sparse_mass(system: System, q: Array) -> scipy.sparse.csr_matrix:
     """Return the mass matrix (n, n) at q, one block per body."""
     return scipy.sparse.csr_matrix(scipy.sparse.block_diag(body_masses(system, q), format="csr"))
 
@@ -64,7 +64,7 @@ def stiffness_diagonal(system: System) -> Array:
     return np.concatenate([body.stiffness for body in system.bodies])
 
 
-def elastic_stiffness(system: System, q: Array, *, every_spring: bool = False) -> "scipy.sparse.csr_matrix":
+def elastic_stiffness(system: System, q: Array, *, every_spring: bool = False) -> scipy.sparse.csr_matrix:
     """Return the elastic stiffness (n, n) of links: omega^2 of modes, J^T k J of the springs between finite segments.
 
     `every_spring` adds the springs at other joints.
@@ -77,13 +77,13 @@ def elastic_stiffness(system: System, q: Array, *, every_spring: bool = False) -
     return scipy.sparse.csr_matrix(stiffness)
 
 
-def sparse_joint_rows(system: System, joints: Iterable[str], q: Array) -> "scipy.sparse.csr_matrix":
+def sparse_joint_rows(system: System, joints: Iterable[str], q: Array) -> scipy.sparse.csr_matrix:
     """Return the derivatives (joints, n) of the coordinates of joints."""
     rows = [scipy.sparse.csr_matrix(joint_coordinate(system, joint, q[None]).rows) for joint in joints]
     return scipy.sparse.csr_matrix(scipy.sparse.vstack([scipy.sparse.csr_matrix((0, system.n)), *rows]))
 
 
-def sparse_jacobian(system: System, q: Array) -> "scipy.sparse.csr_matrix":
+def sparse_jacobian(system: System, q: Array) -> scipy.sparse.csr_matrix:
     """Return Phi_q (m, n) at q; zero in the rows of springs and dampers.
 
     A column is Phi' with unit velocity of one coordinate. Bodies that share no row are moved at once, so that the
@@ -170,9 +170,7 @@ class Saddle:
         Damping in the scale of C W^-1 C^T; none by default.
     """
 
-    def __init__(
-        self, W: "scipy.sparse.csr_matrix", C: "scipy.sparse.csr_matrix", damping: Array | None = None
-    ) -> None:
+    def __init__(self, W: scipy.sparse.csr_matrix, C: scipy.sparse.csr_matrix, damping: Array | None = None) -> None:
         diagonal = np.abs(W.diagonal())
         diagonal[diagonal == 0.0] = 1.0
         self._column = 1.0 / np.sqrt(diagonal)
@@ -218,7 +216,7 @@ class Factor:
         The matrix is singular.
     """
 
-    def __init__(self, matrix: "scipy.sparse.csr_matrix", units: Array) -> None:
+    def __init__(self, matrix: scipy.sparse.csr_matrix, units: Array) -> None:
         scaled = scipy.sparse.csr_matrix(matrix @ scipy.sparse.diags(units))
         size = np.asarray(abs(scaled).max(axis=1).todense()).ravel()
         self._units, self._rows = units, 1.0 / np.where(size > 0.0, size, 1.0)
@@ -255,7 +253,7 @@ class Factor:
         return float(np.prod(np.sign(self._factor.U.diagonal()))) * (-1.0) ** odd
 
 
-def solved(matrix: "scipy.sparse.csr_matrix", units: Array, right: Array) -> Array:
+def solved(matrix: scipy.sparse.csr_matrix, units: Array, right: Array) -> Array:
     """Solve for one right-hand side (n,) with a matrix that may be singular, densely if that is fast enough.
 
     Raises

@@ -283,7 +283,7 @@ def _velocities(system: System, signals: Signals, start: Start, time: float, q: 
 class _VelocityEntry(NamedTuple):
     """A given velocity: its row (1, n), value, scale, and field."""
 
-    row: "scipy.sparse.csr_matrix"
+    row: scipy.sparse.csr_matrix
     value: float
     unit: float
     field: str

@@ -50,7 +50,7 @@ class RestingForces:
         return np.divide(self.workspace.rows, scale, out=np.zeros(rows.size), where=rows["kind"] != CONSTRAINT)
 
 
-def pose_stiffness(system: System, time: float, q: Array, lam: Array) -> "scipy.sparse.csr_matrix":
+def pose_stiffness(system: System, time: float, q: Array, lam: Array) -> scipy.sparse.csr_matrix:
     """Return the derivative (n, n) of the forces at rest by the coordinates, without the diagonal one of beams.
 
     Multipliers of constraints are constant; the torques of springs at joints follow the pose. The unsymmetric part, of

@@ -95,7 +95,7 @@ class System(PlacedBodies):
         return np.real(self.packed.rows["unit"]).astype(float)
 
     @cached_property
-    def slope_rows(self) -> "scipy.sparse.csr_matrix":
+    def slope_rows(self) -> scipy.sparse.csr_matrix:
         """Matrix from coordinates to slopes along all bodies (slopes, n)."""
         rows = scipy.sparse.lil_matrix((sum(len(body.shape.slopes) for body in self.bodies), self.n))
         first = 0

@@ -9,6 +9,8 @@ accelerations), constraint forces (at constant multipliers) and motors along axe
 joints, whose torques are multipliers in the equations, are part of K and D. Baumgarte's terms are not included.
 """
 
+from __future__ import annotations
+
 from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple

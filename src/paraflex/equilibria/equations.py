@@ -9,6 +9,8 @@ has more rows than the mechanism's own. With a fraction s of all given loads and
 so that the force of a held or moved coordinate on the mechanism is -mu.
 """
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -41,7 +43,7 @@ class Unknowns(NamedTuple):
     mu: Array
     s: float
 
-    def plus(self, change: "Unknowns", part: float = 1.0) -> "Unknowns":
+    def plus(self, change: Unknowns, part: float = 1.0) -> Unknowns:
         """Add a multiple of a change."""
         return Unknowns(self.q + part * change.q, self.mu + part * change.mu, self.s + part * change.s)
 

@@ -1,5 +1,7 @@
 """Properties of an equilibrium: stability, natural frequencies, buckling, stiffness in named directions."""
 
+from __future__ import annotations
+
 from collections.abc import Sequence
 from typing import NamedTuple
 

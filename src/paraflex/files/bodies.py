@@ -1,5 +1,7 @@
 """Construction of bodies from their tables in a model file."""
 
+from __future__ import annotations
+
 from collections.abc import Mapping
 from dataclasses import MISSING, fields
 from typing import Any, get_args

@@ -1,5 +1,7 @@
 """Construction of controllers from their tables in a model file, and of tables from controllers."""
 
+from __future__ import annotations
+
 from collections.abc import Mapping, Sequence
 from dataclasses import fields
 from typing import Any

@@ -1,5 +1,7 @@
 """Construction of mechanisms and paths from the tables of a model file."""
 
+from __future__ import annotations
+
 from collections.abc import Mapping
 from typing import Any, cast
 

@@ -1,5 +1,7 @@
 """Runs by external solvers: stops, samples, energies and counts around a `Stepper`."""
 
+from __future__ import annotations
+
 import math
 import time
 

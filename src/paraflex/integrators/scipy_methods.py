@@ -1,5 +1,7 @@
 """SciPy's solvers of ordinary differential equations, one step at a time: a `Stepper`."""
 
+from __future__ import annotations
+
 import math
 import warnings
 

@@ -1,5 +1,7 @@
 """Interface of an external solver: take one step at a time, stop at a time, interpolate within the step."""
 
+from __future__ import annotations
+
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -21,7 +23,7 @@ class SolverCounts(NamedTuple):
     iterations: int
     factorisations: int
 
-    def __add__(self, other: "SolverCounts") -> "SolverCounts":  # type: ignore[override]
+    def __add__(self, other: SolverCounts) -> SolverCounts:  # type: ignore[override]
         """Return the sum of both counts."""
         return SolverCounts(*(a + b for a, b in zip(self, other, strict=True)))
 
@@ -49,7 +51,8 @@ class Stepper(ABC):
 
     def __init__(self, form: OdeForm, tolerances: Array, steps: Steps) -> None:
         self.form, self._tolerances, self._steps = form, tolerances, steps
-        self.t, self.y = 0.0, np.zeros(0)
+        self.t: float = 0.0
+        self.y: Array = np.zeros(0)
         # Times of evaluations in the current step.
         self._seen: list[float] = []
 

@@ -1,5 +1,7 @@
 """CVODE and IDA of SUNDIALS through scikit-sundae, one step at a time: each a `Stepper`."""
 
+from __future__ import annotations
+
 import contextlib
 import io
 import math

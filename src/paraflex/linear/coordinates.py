@@ -6,6 +6,8 @@ bodies, and positions and angles of bodies where these do not suffice: see `inde
 end-effector may take the place of the joints.
 """
 
+from __future__ import annotations
+
 from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from enum import Enum
@@ -97,8 +99,8 @@ class PointTangents(NamedTuple):
     """
 
     whole: Tangents
-    constraints: "RowTangents"
-    joints: "RowTangents"
+    constraints: RowTangents
+    joints: RowTangents
     compliant: Indices
     motors: csr_matrix
 
@@ -124,11 +126,11 @@ class RowTangents(NamedTuple):
     second_rate: csr_matrix
     number: Indices
 
-    def taken(self, rows: Indices) -> "RowTangents":
+    def taken(self, rows: Indices) -> RowTangents:
         """Return the tangents of some of the rows."""
         return RowTangents(*(part[rows] for part in self[:4]), number=self.number[rows])
 
-    def with_rows(self, others: "RowTangents") -> "RowTangents":
+    def with_rows(self, others: RowTangents) -> RowTangents:
         """Return the tangents of these rows followed by others."""
         parts = (csr_matrix(scipy.sparse.vstack(pair)) for pair in zip(self[:4], others[:4], strict=True))
         return RowTangents(*parts, number=np.concatenate([self.number, others.number]))

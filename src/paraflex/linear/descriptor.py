@@ -10,6 +10,8 @@ G is [Phi_q; T], and H has the rows of the constraints and of the driven coordin
 is added to the derivatives of the states: s x = A x + B u + (x_1, x_2). At rest G' and G'' are zero, and c and d known.
 """
 
+from __future__ import annotations
+
 from typing import NamedTuple
 
 import numpy as np

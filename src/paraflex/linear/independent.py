@@ -6,6 +6,8 @@ a tree are thus eliminated from their ends and loops one by one, so the cost for
 proportional to the number of entries.
 """
 
+from __future__ import annotations
+
 import heapq
 from collections.abc import Iterable, Sequence
 from itertools import pairwise

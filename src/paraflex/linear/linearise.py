@@ -1,5 +1,7 @@
 """Linearisation of mechanisms at poses, along planned motions and along runs."""
 
+from __future__ import annotations
+
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
@@ -218,7 +220,7 @@ def linear_model(
 def motion_variables(
     source: TrackingTask | TrackingRun | MotionRun, mode: str | ActuationMode | None, forces: Sequence[str],
     prescribed: Sequence[str], coordinates: FirstCoordinates | str,
-) -> "tuple[OperatingPoints, ModelVariables]":  # fmt: skip
+) -> tuple[OperatingPoints, ModelVariables]:  # fmt: skip
     """Return a motion, and the variables of linear models along it."""
     task = source.task if isinstance(source, TrackingRun) else source
     mechanism = task.system.mechanism if isinstance(task, MotionRun) else task.mechanism

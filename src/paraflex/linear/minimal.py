@@ -11,6 +11,8 @@ and accelerations and multipliers follow from
 with dy'' = T da + y''_q dq + y''_v dv. Driven coordinates have rows in Phi'' as well; their dy'' are inputs.
 """
 
+from __future__ import annotations
+
 from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple

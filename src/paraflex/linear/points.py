@@ -1,5 +1,7 @@
 """Operating points of linear models: poses at rest, planned motions and runs."""
 
+from __future__ import annotations
+
 import numpy as np
 
 from paraflex.arrays import Array

@@ -1,5 +1,7 @@
 """Labelled dataset of linear models, one for each actuation mode: matrices, poles, zeros, responses, mode shapes."""
 
+from __future__ import annotations
+
 import json
 from collections.abc import Sequence
 from importlib.metadata import version

@@ -1,5 +1,7 @@
 """Traces of a run for metrics, computed without a dataset, which would take longer than all metrics."""
 
+from __future__ import annotations
+
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property

@@ -4,6 +4,8 @@ The shell sees an option for each field. A field that is itself a request holds 
 its fields are listed in its place.
 """
 
+from __future__ import annotations
+
 import inspect
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager

@@ -1,5 +1,7 @@
 """Optimisation methods of SciPy and Optuna, applied to one problem in the unit cube."""
 
+from __future__ import annotations
+
 import warnings
 from collections.abc import Callable, Mapping
 from typing import Any

@@ -1,5 +1,7 @@
 """Optimisation problem as functions on the unit cube, defined everywhere, even for designs that do not run."""
 
+from __future__ import annotations
+
 from collections.abc import Mapping, Sequence
 from functools import cached_property
 
