@@ -135,6 +135,10 @@ ForceRows = Annotated[list[Triple], BeforeValidator(lambda value: value, json_sc
 class _Table(BaseModel):
     model_config: ClassVar[ConfigDict] = ConfigDict(extra="forbid", frozen=True)
 
+    if TYPE_CHECKING:
+        # Fields that follow from a class are known at run time only.
+        def __getattr__(self, name: str) -> Any: ...
+
 
 def _optional(description: str, default: Any = None) -> Any:
     """Return a field that may be omitted in a file."""
@@ -280,7 +284,9 @@ def _choice(words: Sequence[str], known: Sequence[str]) -> Any:
     return Literal[tuple(words)], Field(description=f"{', '.join(quoted[:-1])} or {quoted[-1]}")
 
 
-def _table_of(one: Any, kinds: Mapping[str, Any] | None = None, base: type[_Table] = _Table, **others: Any) -> Any:
+def _table_of(
+    one: Any, kinds: Mapping[str, Any] | None = None, base: type[_Table] = _Table, **others: Any
+) -> type[_Table]:
     """Return the table of a class, with the fields of a base table as well, and with a `type` if it is one of kinds."""
     entries = _fields_of(one, **others)
     if kinds and len(kinds) > 1:
@@ -295,7 +301,7 @@ def _member_table(kinds: Mapping[str, Any], base: type[_Table] = _Table) -> Any:
     return tables[0] if len(tables) == 1 else Annotated[reduce(or_, tables), Field(discriminator="type")]
 
 
-def _table_of_any(kinds: Iterable[type], **entries: Any) -> Any:
+def _table_of_any(kinds: Iterable[type], **entries: Any) -> type[_Table]:
     """Return a table with some entries and with the fields of several classes, all of them optional."""
     for kind in kinds:
         entries |= _fields_of(kind, needed=False, without=("name", *entries))

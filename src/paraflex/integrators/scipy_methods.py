@@ -57,7 +57,8 @@ class ScipyStepper(Stepper):
             self._rejected += tried
             return ERROR_TEST if np.all(np.isfinite(self._last)) else NOT_FINITE
         self._rejected += max(tried - 1, 0)
-        self.t, self.y = float(solver.t), solver.y
+        self.t: float = float(solver.t)
+        self.y: Array = solver.y
         return PAUSED if np.all(np.isfinite(solver.y)) else NOT_FINITE
 
     def at(self, time: float) -> Array:

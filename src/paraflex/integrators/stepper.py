@@ -50,7 +50,8 @@ class Stepper(ABC):
     """
 
     def __init__(self, form: OdeForm, tolerances: Array, steps: Steps) -> None:
-        self.form, self._tolerances, self._steps = form, tolerances, steps
+        self.form: OdeForm = form
+        self._tolerances, self._steps = tolerances, steps
         self.t: float = 0.0
         self.y: Array = np.zeros(0)
         # Times of evaluations in the current step.

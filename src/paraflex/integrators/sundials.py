@@ -65,7 +65,8 @@ class SundialsStepper(Stepper):
             return NOT_FINITE
         if result.status < 0:
             return ERROR_TEST if result.status in (_TOO_ACCURATE, _ERROR_TESTS) else NO_CONVERGENCE
-        self.t, self.y = float(result.t), result.y
+        self.t: float = float(result.t)
+        self.y: Array = result.y
         return PAUSED
 
     def at(self, time: float) -> Array:

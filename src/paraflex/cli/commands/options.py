@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from functools import partial
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
-from paraflex.cli.commands.requests import argument, option, repeatable, switch
+from paraflex.cli.commands.requests import FieldMaker, argument, option, repeatable, switch
 from paraflex.errors import InputError
 
 if TYPE_CHECKING:
@@ -16,18 +16,18 @@ if TYPE_CHECKING:
 DEFAULT_MODEL = "raparm_i"
 
 # Functions that return the field of a request.
-json_switch: Any = partial(switch, "--json", "Print JSON instead of tables.")
-path_option: Any = partial(
+json_switch: FieldMaker = partial(switch, "--json", "Print JSON instead of tables.")
+path_option: FieldMaker = partial(
     option, "--path NAME|FILE", "A path of the model (square, line, circle, ...) or a TOML file with one."
 )
-tolerance_option: Any = partial(
+tolerance_option: FieldMaker = partial(
     option, "--tol METRES", "Tolerance. Default: the study's, else 4e-5 of the size.", unit="m"
 )
-method_option: Any = partial(option, "--method NAME", "Method of integration: paraflex methods lists them.")
-assembly_option: Any = partial(option, "--assembly NAME", "Assembly (configuration) of the mechanism.")
-replace_switch: Any = partial(switch, "--force", "Replace results of another kind that the folder holds.")
-report_switch: Any = partial(switch, "--report/--no-report", "Write report.html, or leave it out.", default=True)
-outside_switch: Any = partial(switch, "--allow-outside", "Read tables outside the model's folder that it names.")
+method_option: FieldMaker = partial(option, "--method NAME", "Method of integration: paraflex methods lists them.")
+assembly_option: FieldMaker = partial(option, "--assembly NAME", "Assembly (configuration) of the mechanism.")
+replace_switch: FieldMaker = partial(switch, "--force", "Replace results of another kind that the folder holds.")
+report_switch: FieldMaker = partial(switch, "--report/--no-report", "Write report.html, or leave it out.", default=True)
+outside_switch: FieldMaker = partial(switch, "--allow-outside", "Read tables outside the model's folder that it names.")
 
 
 @dataclass(frozen=True)

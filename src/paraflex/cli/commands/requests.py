@@ -38,8 +38,10 @@ def option(names: str, meaning: str, *, default: Any = None, unit: str = "") -> 
     return _shown(info, default, known[0])
 
 
+# Function that returns the field of a request.
+FieldMaker = Callable[..., Any]
 # Returns a field with the list of all values of an option.
-repeatable = partial(option, default=[])
+repeatable: FieldMaker = partial(option, default=[])
 
 
 def switch(flag: str, meaning: str, *, default: bool | None = False) -> Any:

@@ -8,10 +8,12 @@ from functools import cached_property
 import numpy as np
 
 from paraflex.arrays import Array
+from paraflex.campaign.study import Result
 from paraflex.errors import InputError
 from paraflex.studies.optimisation.evaluate import Evaluate, EvaluatedDesign
 from paraflex.studies.optimisation.objective import Objective
-from paraflex.studies.optimisation.slopes import slopes_of
+from paraflex.studies.optimisation.slopes import Slopes, slopes_of
+from paraflex.studies.optimisation.study import DesignStudy
 
 # Relative violation of a limit that is tolerated.
 _LIMIT_EXCESS = 1e-6
@@ -39,9 +41,9 @@ class DesignProblem:
     """
 
     def __init__(self, objective: Objective, evaluate: Evaluate) -> None:
-        self.study = evaluate.study
+        self.study: DesignStudy[Result] = evaluate.study
         self.evaluate = evaluate
-        self.slopes = slopes_of(evaluate)
+        self.slopes: Slopes = slopes_of(evaluate)
         self.objective = objective
         self.scales: Mapping[str, float] = objective.scales(running_start(evaluate))
         for column, scale in self.scales.items():
