@@ -90,7 +90,13 @@ def _bases(places: Array, *, closed: bool) -> "Iterator[tuple[str, Take]]":
 
     The functions take the path and whether static shapes are renewed.
     """
-    yield ONE, lambda path, renewed: [reduce(model, basis=path.one, renewed=renewed) for model in path.along.models]
+
+    def of_one(path: _Path, renewed: bool) -> list[ReducedModel]:
+        # The basis of a pose need not be carried to that pose.
+        return [path.one if model is path.one.full else reduce(model, basis=path.one, renewed=renewed)
+                for model in path.along.models]  # fmt: skip
+
+    yield ONE, of_one
     for count in (each for each in _COUNTS[closed:] if 2 * each <= places.size + 1):
         chosen = np.round(np.linspace(0, places.size - 1, count)).astype(int)
         parts = np.interp(places, places[chosen], np.arange(count)).tolist()
