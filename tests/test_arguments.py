@@ -23,7 +23,6 @@ from paraflex.findings import Finding, Verdict
 from paraflex.mechanism import EndEffector, Mechanism, Motor, PointRef, RevoluteJoint, RigidBody, Start, WeldJoint
 from paraflex.motion import simulate_motion
 from paraflex.results.export import export, result_tables
-from paraflex.studies import agreement, compare, tracking, verification
 from paraflex.tracking import simulate
 
 # A call, and how its error begins.
@@ -390,7 +389,6 @@ def given(tmp_path_factory):
     data = pf.tracking_dataset(run)
     pf.save_results(data, tmp / "results.nc")
     public = [paraflex.mechanism, paraflex.dynamics, paraflex.results, paraflex.studies, paraflex.report]
-    public += [agreement, compare, tracking, verification]
     names = {name: getattr(module, name) for module in public for name in dir(module) if not name.startswith("_")}
     functions = [simulate, simulate_ked, simulate_motion, export, result_tables]
     return names | {each.__name__: each for each in functions} | {

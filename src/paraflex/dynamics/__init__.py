@@ -1,21 +1,27 @@
 """Equations of motion of a mechanism: its system of constant arrays, consistent states, equilibria, linearisation."""
 
-from paraflex.dynamics.brake import brake as brake
+from paraflex.dynamics.brake import BrakedSystem as BrakedSystem, brake as brake
 from paraflex.dynamics.coordinates import (
     BodyCoordinates as BodyCoordinates,
     Marker as Marker,
     end_markers as end_markers,
+    node_marker as node_marker,
 )
 from paraflex.dynamics.drive import DrivenFreedoms as DrivenFreedoms, driven_freedoms as driven_freedoms
 from paraflex.dynamics.equilibrium import static_equilibrium as static_equilibrium
 from paraflex.dynamics.inputs import Inputs as Inputs, inputs_of as inputs_of
 from paraflex.dynamics.joint_coordinates import (
+    JointCoordinate as JointCoordinate,
+    axis_angle as axis_angle,
     joint_coordinate as joint_coordinate,
     material_angle as material_angle,
     place_along_beam as place_along_beam,
 )
 from paraflex.dynamics.linearise import Vibration as Vibration, natural_frequencies as natural_frequencies
-from paraflex.dynamics.modal_truncation import missing_rotations as missing_rotations
+from paraflex.dynamics.modal_truncation import (
+    MissingRotation as MissingRotation,
+    missing_rotations as missing_rotations,
+)
 from paraflex.dynamics.numbers import numbers_of as numbers_of, same_layout as same_layout, with_numbers as with_numbers
 from paraflex.dynamics.packing import records as records
 from paraflex.dynamics.points import across_chord as across_chord
@@ -24,8 +30,12 @@ from paraflex.dynamics.quasi_static import (
     balanced_state as balanced_state,
     joint_motions as joint_motions,
 )
-from paraflex.dynamics.rank import dependence as dependence, redundant_rows as redundant_rows
-from paraflex.dynamics.sensors import sensor_readings as sensor_readings, sensor_rows as sensor_rows
+from paraflex.dynamics.rank import Dependence as Dependence, dependence as dependence, redundant_rows as redundant_rows
+from paraflex.dynamics.sensors import (
+    SensorRows as SensorRows,
+    sensor_readings as sensor_readings,
+    sensor_rows as sensor_rows,
+)
 from paraflex.dynamics.signals import (
     InputSignals as InputSignals,
     acting_loads as acting_loads,
@@ -40,6 +50,7 @@ from paraflex.dynamics.singularity import SingularityMeasure as SingularityMeasu
 from paraflex.dynamics.soundness import (
     Closure as Closure,
     Mobility as Mobility,
+    Redundancy as Redundancy,
     closure_of as closure_of,
     mobility as mobility,
 )

@@ -27,4 +27,4 @@ from paraflex.fem.modes import (
     modal_basis as modal_basis,
     natural_frequencies as natural_frequencies,
 )
-from paraflex.fem.reference import ReferenceCondition as ReferenceCondition
+from paraflex.fem.reference import ReferenceCondition as ReferenceCondition, reference_basis as reference_basis

@@ -19,6 +19,7 @@ from paraflex.folders.kinds import (
     ResultKind as ResultKind,
 )
 from paraflex.folders.lock import (
+    LOCK as LOCK,
     FolderInUseError as FolderInUseError,
     finish_change as finish_change,
     lock_folder as lock_folder,

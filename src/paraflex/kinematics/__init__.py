@@ -22,3 +22,4 @@ from paraflex.kinematics.paths import (
     turning_of as turning_of,
 )
 from paraflex.kinematics.profiles import CruiseProfile as CruiseProfile, TrapezoidalProfile as TrapezoidalProfile
+from paraflex.kinematics.reach import Shortfall as Shortfall

@@ -42,6 +42,7 @@ from paraflex.mechanism.joints import (
     SlidingJoint as SlidingJoint,
     SlotJoint as SlotJoint,
     WeldJoint as WeldJoint,
+    points_named as points_named,
 )
 from paraflex.mechanism.loads import (
     AppliedTorque as AppliedTorque,
@@ -83,11 +84,13 @@ from paraflex.mechanism.sections import (
     Rectangle as Rectangle,
     Round as Round,
     Section as Section,
+    Shape as Shape,
     Tube as Tube,
 )
 from paraflex.mechanism.segments import (
     FIRST_END as FIRST_END,
     LAST_END as LAST_END,
+    SegmentedMechanism as SegmentedMechanism,
     check_segmentable as check_segmentable,
     finite_segments as finite_segments,
     is_hinge as is_hinge,
@@ -99,6 +102,7 @@ from paraflex.mechanism.sensors import (
     DeflectionSensor as DeflectionSensor,
     Encoder as Encoder,
     JointForceSensor as JointForceSensor,
+    PointSensor as PointSensor,
     PositionSensor as PositionSensor,
     Sensor as Sensor,
     StrainGauge as StrainGauge,

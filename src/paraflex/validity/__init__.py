@@ -13,14 +13,18 @@ from paraflex.integrators import Solution
 from paraflex.validity.bending import bending_of
 from paraflex.validity.causes import likely_cause as likely_cause, with_likely_cause as with_likely_cause
 from paraflex.validity.indicators import (
+    AXIAL_LIMIT as AXIAL_LIMIT,
+    DRIVEN_AXIAL_LIMIT as DRIVEN_AXIAL_LIMIT,
     FOURTH_ORDER_LIMIT as FOURTH_ORDER_LIMIT,
+    SHORTENING_LIMIT as SHORTENING_LIMIT,
+    SLOPE_LIMIT as SLOPE_LIMIT,
     Following as Following,
     Indicator as Indicator,
     fourth_order as fourth_order,
     of_linear,
     of_second_order,
 )
-from paraflex.validity.numbers import implausible_numbers as implausible_numbers
+from paraflex.validity.numbers import implausible_numbers as implausible_numbers, mechanism_size as mechanism_size
 from paraflex.validity.plausibility import (
     Driven as Driven,
     implausible_results as implausible_results,
