@@ -37,6 +37,7 @@ from paraflex.mechanism import (
 )
 from paraflex.results.record import record
 from paraflex.tracking import plan_tracking
+from records import TIP
 
 TURN = 2 * np.pi
 
@@ -106,7 +107,6 @@ def distance(a, b):
 
 TIGHT = IntegrationOptions(tolerance=1e-6)
 FINE = ExudynOptions(step=2.5e-5, refinement=2)
-TIP = ("tip_axial", "tip_transverse", "tip_slope")
 
 
 @pytest.fixture(scope="module")

@@ -56,6 +56,7 @@ from paraflex.results.links import tip_deflection
 from paraflex.results.record import record
 from paraflex.studies import verify
 from paraflex.tracking import plan_tracking
+from records import values
 from shell import paraflex
 from test_elastodynamics import SWING
 
@@ -438,24 +439,17 @@ KINDS = {
 }
 
 
-def found(run, name):
-    """Values of a record; those of the tip (k, bodies, 3) together."""
-    if name == "tip":
-        return np.stack([run.links[f"tip_{part}"] for part in ("axial", "transverse", "slope")], axis=-1)
-    return run.torque if name == "torque" else run.links[name]
-
-
 @pytest.mark.parametrize("kind", list(KINDS))
 def test_a_tracking_study_tells_of_them_what_it_tells_of_a_beam(kind):
     beam, body = replace(stiff(quintic()), **TIP), KINDS[kind]()
     options = IntegrationOptions(method="esdirk5", tolerance=1e-8, newton_fraction=1e-6)
     theirs, mine = (record(tracked(link).simulate("+", options=options)) for link in (beam, body))
     for name in ("angle", "chord_angle", "chord_velocity", "tip", "point_position", "strain_energy", "torque"):
-        one, other = (found(run, name) for run in (mine, theirs))
+        one, other = (values(run, name) for run in (mine, theirs))
         np.testing.assert_allclose(one, other, rtol=0, atol=1e-6 * np.abs(other).max(), err_msg=name)
-    assert np.abs(found(theirs, "tip")[:, 0, 1]).max() > 1e-5
+    assert np.abs(values(theirs, "tip")[:, 0, 1]).max() > 1e-5
     theirs, mine = (record(simulate_ked(tracked(link), "+", step=1e-3)) for link in (beam, body))
-    one, other = (found(run, "tip") for run in (mine, theirs))
+    one, other = (values(run, "tip") for run in (mine, theirs))
     np.testing.assert_allclose(one, other, rtol=0, atol=1e-6 * np.abs(other).max())
 
 
@@ -471,7 +465,7 @@ def test_a_turned_modal_body_has_the_chord_of_the_beam():
     np.testing.assert_allclose(mine.links["chord_angle"] + turn, theirs.links["chord_angle"], rtol=0, atol=1e-6)
     np.testing.assert_allclose(mine.links["chord_velocity"], theirs.links["chord_velocity"], rtol=0, atol=1e-4)
     R = np.array([[np.cos(turn), -np.sin(turn)], [np.sin(turn), np.cos(turn)]])
-    one, other = (found(run, "tip")[:, 0, :2] for run in (mine, theirs))
+    one, other = (values(run, "tip")[:, 0, :2] for run in (mine, theirs))
     np.testing.assert_allclose(one, other @ R.T, rtol=0, atol=1e-7)
 
 

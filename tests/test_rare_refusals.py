@@ -109,7 +109,8 @@ def test_packages_that_are_missing(study, tmp_path, monkeypatch):
         lambda: sweep(study, tmp_path / "out", workers=Workers("dask")),
         "--engine", "Dask is not installed", "pip install 'paraflex[cluster]'",
     )  # fmt: skip
-    monkeypatch.setitem(sys.modules, "sksundae", None)
+    for module in ("sksundae", "sksundae.cvode", "sksundae.ida"):
+        monkeypatch.setitem(sys.modules, module, None)
     model = pf.load("five_bar")
     task = pf.plan(model.mechanism, model.path("square"), duration=0.02, samples=3)
     refused(lambda: task.simulate("++", method="ida"), "method", "SUNDIALS", "pip install")

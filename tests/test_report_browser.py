@@ -103,6 +103,16 @@ def wait_for_drawing(page: Page) -> None:
     page.evaluate("new Promise((done) => requestAnimationFrame(() => requestAnimationFrame(() => done())))")
 
 
+def choose_run(page: Page, row: str) -> None:
+    """Choose a run by its button in a table, once charts in view are drawn: legends of those above it move it."""
+    button = page.locator(row).locator(".pick")
+    button.scroll_into_view_if_needed()
+    wait_for_drawing(page)
+    page.wait_for_function("charts.all.every((chart) => !chart.inView || !chart.stale)")
+    wait_for_drawing(page)
+    button.click()
+
+
 def curves(page: Page, chart: str) -> list[list[float]]:
     """What Plotly draws in a chart, once it is in view and drawn."""
     page.locator(f"#chart-{chart}").scroll_into_view_if_needed()
@@ -389,7 +399,7 @@ def test_the_selector_of_modes_changes_curves_and_mechanism(shared):
     page.keyboard.press("m")
     assert page.evaluate("report.runName()") == MODES[2]
     assert page.locator("tr.selected th").inner_text().strip() == MODES[2]
-    page.locator("tr[data-run='0'] .pick").click()
+    choose_run(page, "tr[data-run='0']")
     assert page.evaluate("report.runName()") == MODES[0]
 
 

@@ -7,7 +7,7 @@ from conftest import DESKTOP, PHONE
 from paraflex.report import save_page
 from paraflex.studies import load_sweep, sweep
 from paraflex.studies.sweeps.report import study_page
-from test_report_browser import SharedPages, drawn, wait_for_drawing
+from test_report_browser import SharedPages, choose_run, drawn, wait_for_drawing
 
 STUDY = """
 mechanism = "raparm_i"
@@ -141,7 +141,7 @@ def test_a_design_chosen_moves_and_is_ringed(shared):
     ring = traces(page, "responses1")[-1]
     page.evaluate("player.seek(0.03)")
     picture, name = drawn(page), page.evaluate("report.runName()")
-    page.locator("tr[data-run='2'] .pick").click()
+    choose_run(page, "tr[data-run='2']")
     assert page.evaluate("report.runName()") != name
     assert drawn(page) != picture
     assert traces(page, "responses1")[-1] != ring

@@ -60,7 +60,8 @@ def table(headings: Sequence[str], rows: Iterable[Sequence[Any]], caption: str =
 def described(shown: Any) -> str:
     """Return a described table, see `figures.tables.Table`; an empty text if it has no rows."""
     numeric = [column.is_numeric for column in shown.columns]
-    heads = [" ".join(filter(None, one.head)) if one.is_numeric else one.name for one in shown.columns]
+    heads = [" ".join(filter(None, one.head)) if is_number else one.name
+             for one, is_number in zip(shown.columns, numeric, strict=True)]  # fmt: skip
     rows, right = shown.texts(), [k for k, one in enumerate(numeric) if one]
     cells = [list(map(typeset, row)) for row in rows[:_MOST_LISTED]]
     more = sentence(f"and {len(rows) - _MOST_LISTED} more rows") if len(rows) > _MOST_LISTED else ""

@@ -32,7 +32,7 @@ from paraflex.dynamics import (
     still_signals,
     undeformed_motion,
 )
-from paraflex.dynamics.points import PointMotion, marker_place, point_motion
+from paraflex.dynamics.points import PointMotion, marker_position, point_motion
 from paraflex.errors import InputError, IntegrationError, ResultWarning, as_enum
 from paraflex.findings import Finding, warn_of
 from paraflex.integrators import IntegrationOptions, Method, Solution, check_times, choose, integrate
@@ -247,7 +247,7 @@ class TrackingRun(Shown):
     @property
     def samples(self) -> int:
         """Number of the task's sample times that the run reached; the state at an event is one more."""
-        return self.solution.t.size - bool(self.solution.event)
+        return self.solution.samples
 
     @cached_property
     def end_effector(self) -> PointMotion:
@@ -298,7 +298,7 @@ class TrackingRun(Shown):
         effector = task.mechanism.end_effector
         if effector is None or not self.follows or not k:
             return None
-        actual = marker_place(task.system, task.system.marker(effector.point), solution.q[:k])[0]
+        actual = marker_position(task.system, task.system.marker(effector.point), solution.q[:k])
         return task.driven(self.mode.name, self.applied, self.condition[:k], actual)
 
     def warn(self) -> None:
@@ -481,8 +481,7 @@ def _drive_and_hold(
         solution = _joined(driven, held, count, held.multipliers[:, own], braked.energy)
         holding = np.zeros((held.t.size, len(task.mechanism.motors)))
         holding[:, columns] = braked.holding(held.multipliers)
-        # The state at an event is one sample more than the times of the task.
-        holding = np.concatenate([torques.evaluate(driven.t[:count]), holding[: held.t.size - bool(held.event)]])
+        holding = np.concatenate([torques.evaluate(driven.t[:count]), holding[: held.samples]])
         return run_of(solution, holding=holding)
 
     try:

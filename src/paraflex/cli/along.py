@@ -130,7 +130,8 @@ def _run(request: RunRequest, model: Model, planned: Sequence[_Along], fidelity:
         if done and not alone:
             numbers = {"paths": {path: result.to_dict() for path, result in done.items()}}
             print_results(numbers, show, as_json=request.json, findings=())
-        console.print_lines(*[] if request.json else places)
+        if not request.json:
+            console.print_lines(*places)
     well = len(done) == len(planned) and all(result.complete for result in done.values())
     return exit_code(well, interrupted=any(result.interrupted for result in done.values()))
 

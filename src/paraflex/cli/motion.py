@@ -90,16 +90,15 @@ def run_motion(request: RunRequest, model: Model, mechanism: Mechanism, options:
         summary = motion_summary(data)
         write_numbers(data, summary, folder)
         print_results(summary, lambda out: _report(out, summary), as_json=request.json)
-        finished = run.solution.status in DONE_STATUSES
+        finished, interrupted = run.solution.status in DONE_STATUSES, run.solution.status == "interrupted"
         try:
             write_drawn(data, folder, request.drawn)
         finally:
             if not finished:
                 message = run.solution.message
-                kept = run.solution.status == "interrupted"
-                console.print_lines(f"{message}; results until then are kept" if kept else f"error: {message}")
+                console.print_lines(f"{message}; results until then are kept" if interrupted else f"error: {message}")
         print_location(began, "results", folder.path, request.drawn, as_json=request.json)
-        return exit_code(finished, interrupted=run.solution.status == "interrupted")
+        return exit_code(finished, interrupted=interrupted)
 
 
 def _first(run: MotionRun) -> State:

@@ -14,7 +14,6 @@ from paraflex.compilation import compile_kernels_for
 from paraflex.figures.designs import column_label
 from paraflex.figures.search import tables
 from paraflex.formatting import common_unit, number, quantity
-from paraflex.plots import save_figures
 from paraflex.studies import load_identification, load_optimisation
 from paraflex.studies.optimisation.identify import IdentificationResult
 from paraflex.studies.optimisation.optimise import OptimisationResult
@@ -53,6 +52,8 @@ def _search(request: SearchRequest, study: DesignStudy[R], report: Callable[[Pla
     more = {"folder": str(result.folder), "fresh": result.fresh, "verdict": verdict.to_dict()}
     print_results(numbers | more, show, as_json=request.json, findings=verdict)
     if not result.interrupted:
+        from paraflex.plots import save_figures
+
         save_figures(numbers, request.folder / "figures")
     return exit_code(bool(result.values), interrupted=result.interrupted)
 

@@ -33,7 +33,7 @@ def sweep_command(request: SweepRequest) -> int:
     figures = {"folder": str(result.folder), "table": str(result.table), **result.to_dict()}
     session = {"fresh": result.fresh, "seconds": result.seconds, "interrupted": result.interrupted}
     more = session | {"part": parts, "verdict": verdict.to_dict()}
-    print_results(figures | more, lambda _: _report(console, result), as_json=request.json, findings=verdict)
+    print_results(figures | more, lambda out: _report(out, console, result), as_json=request.json, findings=verdict)
     if request.report and result.done:
         _write_report(console, folder, result)
     return exit_code(not result.done or bool(result.counts.get("complete")), interrupted=result.interrupted)
@@ -62,13 +62,13 @@ def _write_report(console: PlainConsole, folder: Path, result: SweepResult) -> N
     console.print_lines(f"report: {folder / 'report.html'}")
 
 
-def _report(console: PlainConsole, result: SweepResult) -> None:
+def _report(out: PlainConsole, console: PlainConsole, result: SweepResult) -> None:
     statuses = ", ".join(f"{number} {status}" for status, number in sorted(result.counts.items()))
-    PlainConsole().print(f"{result.done} of {result.total} runs: {statuses or 'none yet'}")
+    out.print(f"{result.done} of {result.total} runs: {statuses or 'none yet'}")
     if result.beyond:
-        PlainConsole().print_lines(f"warning: {beyond_limits(result.beyond)}")
+        out.print_lines(f"warning: {beyond_limits(result.beyond)}")
     if result.coarse:
-        PlainConsole().print_lines(f"warning: {coarse_runs(result.coarse)}")
+        out.print_lines(f"warning: {coarse_runs(result.coarse)}")
     if result.fresh:
         console.print(
             f"{result.fresh} of them in {quantity(result.seconds, 's', padded=False)} now, "

@@ -15,7 +15,7 @@ from paraflex.designs.samples import SweptParameter
 from paraflex.designs.schema import SweepTable, VaryTable, check_of_statics
 from paraflex.designs.units import check_unit_of, unit_of
 from paraflex.equilibria.conditions import chosen_over
-from paraflex.errors import InputError, suggestion
+from paraflex.errors import InputError, suggestion, within
 from paraflex.files import Model, StudyDefaults, library_names, model_from
 from paraflex.files.expressions import ExpressionError, evaluate
 from paraflex.files.generators import is_generated
@@ -342,10 +342,8 @@ def _integration(table: SweepTable) -> dict[str, Any]:
 def _check(setting: Setting, model: Model) -> None:
     if setting.has_path:
         model.check_start()
-    try:
+    with within("integration"):
         setting.options(model)
-    except InputError as error:
-        raise error.within("integration") from None
     check_times(setting.duration, setting.samples)
     if setting.has_path and setting.balanced:
         raise InputError(

@@ -194,8 +194,6 @@ class _Residual:
         self.kept = _joints(system, held, start.q)[0]
         self.forces = RestingForces(system, start.time, beams=True)
         self.largest_effort = 0.0
-        # The scale of friction rows is set separately and has no default.
-        self.forces.workspace.compliance[:] = system.packed.rows["compliance"]
 
     def __call__(self, z: Array) -> Array:
         system, forces = self.system, self.forces

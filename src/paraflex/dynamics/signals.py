@@ -8,7 +8,7 @@ import numpy as np
 
 from paraflex.arrays import Array
 from paraflex.dynamics.inputs import inputs_of
-from paraflex.errors import InputError
+from paraflex.errors import InputError, within
 from paraflex.kernel.packed import PackedSystem, Signals
 from paraflex.mechanism import Mechanism, TabulatedProfile, TimeProfile
 
@@ -224,10 +224,8 @@ def _grid(profile: TimeProfile, a: float, b: float, end: float) -> Array:
 
 
 def _evaluate(place: str, profile: TimeProfile, t: Array) -> tuple[Array, Array, Array]:
-    try:
+    with within(place):
         return profile.evaluate(t)
-    except InputError as error:
-        raise error.within(place) from None
 
 
 def _pack(signals: Sequence[InputSignals]) -> Signals:

@@ -221,10 +221,10 @@ def build_system(mechanism: Mechanism, like: System | None = None) -> System:
         body_coordinates(body, mechanism.geometry, None if body.name in reduced else modes.get(body.name))
         for body in mechanism.bodies
     )
-    undamped, offset = [], 0
+    undamped, offset, given = [], 0, PlacedBodies(mechanism, whole)
     for body in whole:
         if body.name in reduced:
-            body = reduced_body(PlacedBodies(mechanism, whole), constraints, body.name, modes.get(body.name))
+            body = reduced_body(given, constraints, body.name, modes.get(body.name))
         undamped.append(replace(body, offset=offset))
         offset += 3 + body.nf
     bodies, placed = [], PlacedBodies(mechanism, tuple(undamped))

@@ -106,6 +106,19 @@ class _Pattern(NamedTuple):
         return csr_matrix((values.ravel()[self.sources], self.columns, self.pointers), shape=self.shape)
 
 
+def rows_of(rows: Indices, *matrices: csr_matrix) -> tuple[csr_matrix, ...]:
+    """Return selected rows of matrices with the same sparsity pattern, which SciPy would select anew for each."""
+    pointers, columns, shape = matrices[0].indptr, matrices[0].indices, matrices[0].shape
+    assert shape is not None
+    counts = np.diff(pointers)[rows]
+    ends = np.cumsum(counts)
+    taken = np.arange(counts.sum()) + np.repeat(pointers[rows] - ends + counts, counts)
+    at = np.concatenate([[0], ends])
+    return tuple(
+        csr_matrix((matrix.data[taken], columns[taken], at), shape=(rows.size, shape[1])) for matrix in matrices
+    )
+
+
 @dataclass(frozen=True)
 class Tangency:
     """Sparsity pattern of a system's tangent matrices, and the matrices at points of its motions.
@@ -170,8 +183,8 @@ class Tangency:
         stiffness, second_place = self._columns(point, INDEX_1, COORDINATE)
         rate = self._columns(point, _RATES, COORDINATE)[1] if np.any(point.v) else 0.0 * second_place
         rows, compliant = np.nonzero(self.system.constrained)[0], np.nonzero(~self.system.constrained)[0]
-        held = (matrix[rows] for matrix in (jacobian, rate, second_place, second_rate))
-        place, speed = second_place[compliant], second_rate[compliant]
+        held = rows_of(rows, jacobian, rate, second_place, second_rate)
+        place, speed = rows_of(compliant, second_place, second_rate)
         if compliant.size:
             # Directions in which their torques act: the derivatives of angles and travels.
             kinds = self.system.packed.rows["kind"][compliant]

@@ -51,9 +51,8 @@ def coordinate_named(mechanism: Mechanism, name: str, field: str) -> Coordinate:
     InputError
         There is no such joint or point, or the joint has no variable coordinate.
     """
-    joints = {joint.name: joint for joint in mechanism.joints}
-    if name in joints:
-        joint = joints[name]
+    if name in mechanism.joints_by_name:
+        joint = mechanism.joints_by_name[name]
         if not joint.moves:
             kept = "holds its angle" if "angle" in joint.holds else "keeps a distance"
             raise InputError(f"{kept}, so that it has no coordinate", field=field, value=name,
@@ -62,7 +61,7 @@ def coordinate_named(mechanism: Mechanism, name: str, field: str) -> Coordinate:
     place, _, axis = name.rpartition(".")
     points = [f"{body.name}.{point}" for body in mechanism.bodies for point in body.points]
     if axis not in _AXES or place not in points:
-        known = [*joints, *(f"{point}.{each}" for point in points for each in _AXES)]
+        known = [*mechanism.joints_by_name, *(f"{point}.{each}" for point in points for each in _AXES)]
         raise InputError("is neither a joint nor a coordinate of a point", field=field, value=name,
                          remedy=f'{suggestion(name, known)}; for points it is "body.point.x", ".y" or ".angle"'
                          )  # fmt: skip

@@ -41,13 +41,14 @@ def controllers(data: xr.Dataset) -> Iterator[Chart]:
             units = [one.units[name] for name in names]
             for number_of_unit, unit in enumerate(dict.fromkeys(units[k] for k in known)):
                 own = [k for k in known if units[k] == unit]
-                chart = _signals(one, variable, own, Axis(_WORDS.get(unit, "reading"), unit))
+                chart = _signals(one, variable, names, values, own, Axis(_WORDS.get(unit, "reading"), unit))
                 yield replace(chart, identity=f"{chart.identity}-{number_of_unit}", spans=after_motion(data))
 
 
-def _signals(one: ControllerData, variable: str, own: Sequence[int], axis: Axis) -> Chart:
+def _signals(
+    one: ControllerData, variable: str, names: Sequence[str], values: Array, own: Sequence[int], axis: Axis
+) -> Chart:
     """Return the chart of the torques or readings of a controller, by index, that share a unit."""
-    names, values = one.signals(variable)
 
     def held(name: str, r: int, p: int, times: Array, values: Array, **more: Any) -> Curve:
         x, y = stairs(times, values)

@@ -133,7 +133,9 @@ def buckling_chart(data: xr.Dataset) -> Iterator[Chart]:
 
 def buckled(data: xr.Dataset) -> Iterator[tuple[int, float, Array]]:
     """Yield the step of `seen_buckling`, and for each factor there the stations before and after (2, stations, 2)."""
-    step, numbers = seen_buckling(data) or (0, ())
+    if (seen := seen_buckling(data)) is None:
+        return
+    step, numbers = seen
     places = data["shape"].values[step].astype(float)
     swing = _SWING * float(np.max(np.ptp(places, axis=0)))
     for which in numbers:

@@ -139,7 +139,7 @@ def link_phases(data: xr.Dataset) -> Iterator[Chart]:
 
 def of_member(
     data: xr.Dataset, choice: int, actual: Sequence[Array], desired: Sequence[Array], point: str | None = None,
-    start: Sequence[Array] = (),
+    starts_as_desired: bool = False,
 ) -> Iterator[Curve]:  # fmt: skip
     """Yield the curves of a quantity of one member over time, or of the second of two over the first.
 
@@ -155,14 +155,14 @@ def of_member(
         Desired values; empty if there are none.
     point : str, optional
         Point in place of the end-effector.
-    start : sequence of (samples,) array
-        Values whose first ones have the mark in place of the actual ones.
+    starts_as_desired : bool, default False
+        Whether the mark is at the start of the desired values, if there are any, in place of the actual ones.
     """
     for r, stopped in enumerate(stopped_runs(data)):
         *x, y = (each[r] for each in actual)
         yield Curve(actual_name(data, r, point), y, *x, look=look(0), run=r, shown=(r,), choice=choice, stopped=stopped)
         if x:
-            yield start_mark(*(start or [*x, y]), run=r, choice=choice)
+            yield start_mark(*((starts_as_desired and desired) or [*x, y]), run=r, choice=choice)
     if desired:
         *x, y = desired
         yield Curve("desired", y, *x, look=Look(dash=DOTTED), choice=choice, desired=True)

@@ -5,7 +5,7 @@ Numbers are in SI units; `Table.texts` converts and formats them by the one rule
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, TypeGuard
 
 import numpy as np
 
@@ -66,8 +66,7 @@ class Column:
     def values(self) -> list[float]:
         """Numbers with a unit."""
         cells = (*self.cells, *(() if self.below_unit else self.below))
-        kinds = (float, int, np.integer) if self.unit else (float,)
-        return [float(cell) for cell in cells if isinstance(cell, kinds) and not isinstance(cell, bool)]
+        return [float(cell) for cell in cells if isinstance(cell, float) or (self.unit and _is_whole(cell))]
 
     @property
     def shown_unit(self) -> DisplayUnit:
@@ -189,7 +188,7 @@ def in_row_units(columns: Sequence[Column], units: Sequence[str]) -> list[Column
     return [*converted, Column("unit", [NO_VALUE if unit.name in ("", "1") else unit.name for unit in shown])]
 
 
-def _is_whole(cell: object) -> bool:
+def _is_whole(cell: object) -> TypeGuard[int]:
     """Check whether a cell is a whole number, which is written as it is if it has no unit."""
     return isinstance(cell, int | np.integer) and not isinstance(cell, bool)
 

@@ -215,7 +215,7 @@ def _of_directions(data: xr.Dataset, names: Sequence[str], point: str | None) ->
     for k, direction in enumerate(directions):
         a = names_of(data, "axis").index(direction)
         wanted = [each[:, a] for each in desired]
-        curves += of_member(data, k, [each[..., a] for each in actual], wanted, point, wanted)
+        curves += of_member(data, k, [each[..., a] for each in actual], wanted, point, starts_as_desired=True)
     *extents, extent = (peak(each) if len(names) > 1 else peak(ranges(each, axis=-2)) for each in desired or actual)
     word, unit, dots = _MOTION[names[-1]]
     chart = Chart(

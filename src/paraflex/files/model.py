@@ -212,13 +212,15 @@ class Model(CheckedFields):
         self.check_start()
         followed = path if isinstance(path, Path) else self.path(path)
         study = self.study.filled(samples=samples, assembly=assembly, orientation=orientation, after=after)
-        chosen = {name: getattr(study, name) for name in ("samples", "assembly", "orientation", "after")}
         task = plan_tracking(
             self.mechanism if mechanism is None else mechanism,
             followed,
             duration=self.duration(followed, duration),
+            samples=study.samples,
+            assembly=study.assembly,
+            orientation=study.orientation,
+            after=study.after,
             warning=warning,
-            **chosen,
         )
         return task if study.shaper is None else shape_torques(task, study.shaper)
 

@@ -54,8 +54,7 @@ class RefinedTimes(NamedTuple):
     def kept(self, solution: Solution) -> Solution:
         """Return the solution with the requested samples and the state at an event only."""
         keep = np.ones(solution.t.size, dtype=bool)
-        count = solution.t.size - bool(solution.event)
-        keep[:count] = self.stored[:count]
+        keep[: solution.samples] = self.stored[: solution.samples]
         names = ("t", "q", "v", "a", "multipliers", "kinetic_energy", "strain_energy", "work")
         return replace(solution, **{name: getattr(solution, name)[keep] for name in names})
 

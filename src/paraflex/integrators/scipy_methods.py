@@ -31,7 +31,7 @@ class ScipyStepper(Stepper):
     def begin(self, t: float, y: Array, stop: float) -> None:
         """Restart from y at t towards a stop, see `Stepper`."""
         self._past = self.counts() if hasattr(self, "_solver") else self._past
-        self._rejected, self._dense = 0, None
+        self.t, self.y, self._rejected, self._dense = t, y, 0, None
         options = {"jac": self.form.jacobian} if self._stages else {}
         self._solver = self._class(
             self._evaluate, t, y, stop, rtol=_RELATIVE, atol=self._tolerances, max_step=self._steps.longest,

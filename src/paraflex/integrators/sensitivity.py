@@ -85,8 +85,6 @@ class RunDerivatives:
         Samples of the run.
     derivatives : Motion
         Derivatives of the samples by the parameters.
-    steps : int
-        Number of accepted steps.
     residual : float
         Largest last correction of the equations of any stage, relative to the corrected values.
     """
@@ -94,7 +92,6 @@ class RunDerivatives:
     t: Array
     motion: Motion
     derivatives: Motion
-    steps: int
     residual: float
 
 
@@ -164,7 +161,6 @@ def run_derivatives(problem: Problem, options: IntegrationOptions, directions: S
         t=problem.times,
         motion=motion,
         derivatives=Motion(*derivatives),
-        steps=int(run.state.counts[at.STEPS]),
         residual=varied.residual,
     )
 

@@ -101,6 +101,11 @@ class Solution:
         return f"step {self.t[sample]:.0f}" if self.resting else f"t = {self.t[sample]:.{digits}g} s"
 
     @property
+    def samples(self) -> int:
+        """Number of the requested sample times that the run reached; the state at an event is one more."""
+        return self.t.size - bool(self.event)
+
+    @property
     def event_time(self) -> float:
         """Time of the event that stopped the run [s]; NaN if there was none."""
         return float(self.t[-1]) if self.event else math.nan

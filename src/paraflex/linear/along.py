@@ -8,7 +8,7 @@ import numpy as np
 from paraflex.arguments import checked_arguments
 from paraflex.arrays import Array
 from paraflex.dynamics import State
-from paraflex.dynamics.points import marker_place
+from paraflex.dynamics.points import marker_position
 from paraflex.errors import InputError
 from paraflex.limits import solvable
 from paraflex.linear.coordinates import FirstCoordinates
@@ -97,7 +97,7 @@ def _lengths(source: TrackingTask | TrackingRun | MotionRun) -> tuple[Array, str
     effector = system.mechanism.end_effector
     if effector is None:
         return t - t[0], "s"
-    places = marker_place(system, system.marker(effector.point), q)[0]
+    places = marker_position(system, system.marker(effector.point), q)
     return np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(places, axis=0), axis=1))]), "m"
 
 

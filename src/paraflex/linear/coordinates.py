@@ -23,7 +23,7 @@ from paraflex.dynamics import System, joint_coordinate, material_angle
 from paraflex.dynamics.constraints import coordinate_kind
 from paraflex.dynamics.points import marker_place
 from paraflex.dynamics.system import with_constraints_of
-from paraflex.dynamics.tangents import MotionPoint, Tangency, Tangents
+from paraflex.dynamics.tangents import MotionPoint, Tangency, Tangents, rows_of
 from paraflex.errors import InputError
 from paraflex.linear.independent import independent_dense, independent_sparse
 from paraflex.mechanism import GROUND, ConstantSpeed, Mechanism, PointRef, PrescribedAngle, RevoluteJoint
@@ -128,7 +128,7 @@ class RowTangents(NamedTuple):
 
     def taken(self, rows: Indices) -> RowTangents:
         """Return the tangents of some of the rows."""
-        return RowTangents(*(part[rows] for part in self[:4]), number=self.number[rows])
+        return RowTangents(*rows_of(rows, *self[:4]), number=self.number[rows])
 
     def with_rows(self, others: RowTangents) -> RowTangents:
         """Return the tangents of these rows followed by others."""
@@ -237,7 +237,7 @@ class Coordinates:
         def rows(selected: Indices) -> RowTangents:
             at = np.searchsorted(whole.rows, selected)
             parts = (whole.jacobian, whole.rate, whole.second_place, whole.second_rate)
-            return RowTangents(*(part[at] for part in parts), number=number[selected])
+            return RowTangents(*rows_of(at, *parts), number=number[selected])
 
         # No row of the fictitious pin is a constraint, whether it is a coordinate or not.
         pin = [k for k, name in enumerate(names) if name.startswith(_TASK)]

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 import scipy
@@ -141,8 +141,9 @@ def linearise(
     SingularPositionError
         The position is singular, so that no coordinates describe the motion.
     """
-    pose = {"at": at, "assembly": assembly, "start": start, "balanced": balanced or None}
-    return linear_model(*operating_point(source, mode, forces, prescribed, coordinates, **pose))
+    return linear_model(*operating_point(
+        source, mode, forces, prescribed, coordinates, at=at, assembly=assembly, start=start, balanced=balanced
+    ))  # fmt: skip
 
 
 def operating_point(
@@ -151,16 +152,17 @@ def operating_point(
     forces: Sequence[str] = (),
     prescribed: Sequence[str] = (),
     coordinates: FirstCoordinates | str = FirstCoordinates.MOTORS,
-    **pose: Any,
+    *,
+    at: float | None = None,
+    assembly: str | None = None,
+    start: Start | State | None = None,
+    balanced: bool | None = None,
 ) -> tuple[ModelVariables, MotionPoint, float]:
-    """Return the first arguments of `linear_model` for those of `linearise`.
-
-    Arguments of `linearise` that are not named here are those of `pose`, None where they are not given.
-    """
+    """Return the first arguments of `linear_model` for those of `linearise`."""
     moves = isinstance(source, TrackingTask | TrackingRun | MotionRun)
-    at, assembly, start, balanced = (pose.get(name) for name in ("at", "assembly", "start", "balanced"))
-    for name in ("assembly", "start", "balanced") if moves else ("at",):
-        if (value := pose.get(name)) is not None:
+    without_meaning = {"assembly": assembly, "start": start, "balanced": balanced or None} if moves else {"at": at}
+    for name, value in without_meaning.items():
+        if value is not None:
             raise InputError(
                 f"has no meaning for a {'motion' if moves else 'pose at rest'}", field=name, value=value,
                 remedy="leave it out, or give the mechanism" if moves else "leave it out, or give a plan or a run",

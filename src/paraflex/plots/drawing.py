@@ -37,8 +37,6 @@ from paraflex.plots.themes import Theme, theme
 _MOST_NAMED = 9
 # Room above and below a drawing, and above a panel of several [mm].
 _HEAD, _FOOT, _PANEL_HEAD = 5.0, 5.5, 4.5
-# Smallest and largest ratio of height to width of a panel, and the largest of one that is as wide as the page.
-_FLATTEST, _TALLEST, _TALLEST_ALONE = 0.4, 1.6, 0.6
 # Width of links [pt], and diameters of a body at a single place, a pin and the end-effector.
 _LINK, _DOT, PIN_SIZE, _TIP = 3.4, 7.0, 5.4, 4.2
 # Shortest line as a share of the picture: Agg draws no line of zero length, nor one that it snaps to a single pixel.
@@ -141,7 +139,11 @@ def bare(axes: Axes, limits: Limits) -> Axes:
 
 
 def pictures(
-    rows: Mapping[str, Sequence[tuple[Scene, str]]], look: Theme, columns: int, width: float
+    rows: Mapping[str, Sequence[tuple[Scene, str]]],
+    look: Theme,
+    columns: int,
+    width: float,
+    aspects: tuple[float, float],
 ) -> tuple[Figure, Limits]:
     """Draw the last time of scenes side by side, with the links of earlier times pale; return figure and limits.
 
@@ -155,9 +157,11 @@ def pictures(
         Number of panels side by side.
     width : float
         Width of links relative to that in a film.
+    aspects : (float, float)
+        Smallest and largest height of a panel relative to its width.
     """
     shown = [one for row in rows.values() for one, _ in row]
-    limits, aspect = common_limits(shown).filling(_FLATTEST, _TALLEST if columns > 1 else _TALLEST_ALONE)
+    limits, aspect = common_limits(shown).filling(*aspects)
     page = page_width(TWO_COLUMNS)
     tall = page / columns * aspect
     lines = {heading: -(-len(row) // columns) for heading, row in rows.items()}

@@ -20,6 +20,8 @@ from paraflex.results.statics_steps import as_samples
 
 # Width of links relative to that in a film.
 _WIDTH = 0.7
+# Smallest and largest height relative to the width of a panel that fills the page.
+_ALONE = (0.35, 0.6)
 
 
 @drawn
@@ -30,7 +32,7 @@ def deformed_shapes(data: xr.Dataset, theme_name: str = "light") -> Figure:
         raise InputError("nothing is loaded or moved in these equilibria", field="data",
                          remedy="give --load or --move")  # fmt: skip
     look = theme(theme_name)
-    figure, limits = pictures({"": [(_steps(data), "")]}, look, 1, _WIDTH)
+    figure, limits = pictures({"": [(_steps(data), "")]}, look, 1, _WIDTH, _ALONE)
     draw_scale_bar(figure, limits, look, (0.98, 0.02), 8.0)
     return figure
 
@@ -47,7 +49,7 @@ def buckling_shapes(data: xr.Dataset, theme_name: str = "light") -> Figure:
     if not found:
         raise InputError("nothing buckles under these loads", field="data", remedy="load it, or ask for --buckling 1")
     columns = 1 if is_narrow() else min(len(found), 3)
-    return pictures({"": found}, theme(theme_name), columns, _WIDTH)[0]
+    return pictures({"": found}, theme(theme_name), columns, _WIDTH, _ALONE if columns == 1 else (0.35, 1.6))[0]
 
 
 def _steps(data: xr.Dataset) -> Scene:

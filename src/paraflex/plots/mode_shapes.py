@@ -51,7 +51,7 @@ def mode_shapes(data: xr.Dataset, mode: str | None = None, count: int = 4, theme
         for holding, shown in rows.items()
     }
     columns = min(2 if is_narrow() else 4, max(map(len, rows.values())))
-    return pictures(scenes, theme(theme_name), columns, _WIDTH)[0]
+    return pictures(scenes, theme(theme_name), columns, _WIDTH, (0.4, 1.6))[0]
 
 
 def _scene(data: xr.Dataset, one: DrawnMode) -> Scene:

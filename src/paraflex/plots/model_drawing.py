@@ -223,7 +223,8 @@ def _body_names(shown: Scene, look: Theme) -> list[Name]:
         line = figure_of(places)[0]
         line = line[np.isfinite(line).all(axis=1)]
         if len(line):
-            names.append(Name(body, along(line, (0.5, 0.35, 0.65, 0.22, 0.78)), look.link(number), bold=True))
+            anchors = along(line, (0.5, 0.35, 0.65, 0.22, 0.78)) if len(line) > 1 else line
+            names.append(Name(body, anchors, look.link(number), bold=True))
     return names
 
 

@@ -128,9 +128,10 @@ def _line(places: Array, look: str, name: str, pen: Pen) -> str:
 
 
 def _dot(places: Array, radius: float, look: str, name: str, pen: Pen) -> str:
-    if np.isnan(places).any():
+    pixels = pen.pixels(places)
+    if np.isnan(pixels).any():
         return ""
-    x, y = ([f"{value:.1f}" for value in column] for column in pen.pixels(places).T)
+    x, y = ([f"{value:.1f}" for value in column] for column in pixels.T)
     inside = _title(name) + animated("cx", x, pen.seconds) + animated("cy", y, pen.seconds)
     return f'<circle cx="{x[0]}" cy="{y[0]}" r="{radius * pen.unit:.1f}" {look}>{inside}</circle>'
 

@@ -28,7 +28,7 @@ from paraflex.results.labelled import (
 )
 from paraflex.results.record import Record, record
 from paraflex.tracking import TrackingRun
-from paraflex.validity import implausible_numbers
+from paraflex.validity import beyond_range, implausible_numbers
 
 
 @checked_arguments()
@@ -131,9 +131,8 @@ def _findings(records: Sequence[Record]) -> Iterator[Finding]:
     part = part_of(task.path, float(task.motion.t[-1]))
     if part is not None:
         yield part.finding()
-    beyond = [(one.validity, one.mode) for one in records if one.validity is not None and not one.validity.holds]
-    for validity, mode in sorted(beyond, key=lambda pair: -pair[0].ratio):
-        yield validity.finding(f"{MODE}{mode}")
+    for one in sorted(records, key=lambda one: -one.validity.ratio if one.validity else 0.0):
+        yield from beyond_range(one.validity, f"{MODE}{one.mode}")
     for one in records:
         yield from one.findings
 

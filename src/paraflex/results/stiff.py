@@ -15,6 +15,8 @@ from paraflex.dynamics import System, build_system
 from paraflex.dynamics.joint_coordinates import joint_coordinate
 from paraflex.dynamics.signals import no_signals
 from paraflex.errors import InputError, NumericalError
+from paraflex.kernel.constraints import constraint_values, fill_jacobian
+from paraflex.kernel.packed import make_scratch
 from paraflex.mechanism import Mechanism
 from paraflex.results.outlines import Outline
 
@@ -105,9 +107,13 @@ def _closed(system: System, drawn: Sequence[Outline], q: Array, driven: Mapping[
 
 def _rows(system: System, q: Array, chosen: Mask, driven: Mapping[str, Array]) -> tuple[Array, Array]:
     """Return the residuals (k, m) of joints and of driven coordinates, and their Jacobian (k, m, n)."""
-    signals, poses = no_signals(system.packed), np.ascontiguousarray(q)
-    phi = np.array([system.constraints(signals, 0.0, pose)[0] for pose in poses])
-    jacobian = np.array([system.jacobian(pose) for pose in poses])
+    # The scratch of the kernels is made once for all poses.
+    packed, scratch, signals = system.packed, make_scratch(system.packed), no_signals(system.packed)
+    phi, jacobian = np.zeros((len(q), system.m)), np.zeros((len(q), system.m, system.n))
+    rate, still = np.zeros(system.m), np.zeros(system.n)
+    for k, pose in enumerate(np.ascontiguousarray(q)):
+        constraint_values(packed, signals, 0.0, pose, still, scratch, phi[k], rate)
+        fill_jacobian(packed, pose, jacobian[k])
     held = [(joint_coordinate(system, name, q), value) for name, value in driven.items()]
     return (
         np.concatenate([phi[:, chosen], *((one.value - value)[:, None] for one, value in held)], axis=1),

@@ -160,8 +160,7 @@ def discretise(model: Any, period: float, delay: float = 0.0) -> SampledPlant:
     not_negative(delay, "delay", "s")
     whole, part = whole_and_part(delay / period)
     scaled, back = _scaled(model, named.matrices)
-    times = period * part, period * (1.0 - part), period
-    late, early, over = (scipy.signal.cont2discrete(scaled, time)[:2] for time in times)
+    late, early, over = (_held(scaled, time) for time in (period * part, period * (1.0 - part), period))
     old, new = (back @ each for each in (early[0] @ late[1], early[1]))
     n, m, p = len(named.states), len(named.inputs), len(named.outputs)
     feeds = bool(np.any(named.matrices.D))
@@ -268,3 +267,12 @@ def _scaled(model: Any, matrices: StateSpace) -> tuple[StateSpace, Array]:
         return matrices, np.zeros((0, 0))
     A, (sizes, _) = scipy.linalg.matrix_balance(matrices.A, permute=False, separate=True)
     return StateSpace(A, matrices.B / sizes[:, None], matrices.C * sizes, matrices.D), np.diag(sizes)
+
+
+def _held(matrices: StateSpace, time: float) -> tuple[Array, Array]:
+    """Return Phi (n, n) and Gamma (n, m) over a time [s] with inputs held; loading `scipy.signal` takes longer."""
+    n, m = matrices.B.shape
+    both = np.zeros((n + m, n + m))
+    both[:n, :n], both[:n, n:] = matrices.A, matrices.B
+    whole = scipy.linalg.expm(both * time)
+    return whole[:n, :n], whole[:n, n:]

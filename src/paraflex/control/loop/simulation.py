@@ -409,7 +409,7 @@ class Simulation:
 
     def _as_controlled(self, solution: Solution) -> ControlledTracking | ControlledMotion:
         """Return the run with a solution."""
-        k = solution.t.size - bool(solution.event)
+        k = solution.samples
         slack = _ROUNDING * (self.end - self._initial.time)
         log = self._torques.log
         applied, commanded = log.at(solution.t, slack), log.given(solution.t, slack)
