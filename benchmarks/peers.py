@@ -31,15 +31,7 @@ from typing import Any
 
 import numpy as np
 from common import Trial, coarsest_within, command_line, single_thread, write_json, write_page
-from engines import (
-    ExudynSetting,
-    MuJoCoSetting,
-    Run,
-    distance,
-    run_exudyn,
-    run_mujoco,
-    tracking_problem,
-)
+from engines import ExudynSetting, MuJoCoSetting, Run, distance, run_exudyn, run_mujoco, tracking_problem
 from models import PAPER, SECOND_ORDER, BeamModel
 from numpy.typing import NDArray
 from peers_tables import leads, print_results, readme_table

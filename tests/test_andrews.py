@@ -7,15 +7,7 @@ from paraflex.dynamics import State, build_system, pack_signals
 from paraflex.dynamics.state import mass_matrix
 from paraflex.files import load
 from paraflex.integrators import IntegrationOptions
-from paraflex.mechanism import (
-    AppliedTorque,
-    Assembly,
-    LinearSpring,
-    Mechanism,
-    PointRef,
-    RevoluteJoint,
-    RigidBody,
-)
+from paraflex.mechanism import AppliedTorque, Assembly, LinearSpring, Mechanism, PointRef, RevoluteJoint, RigidBody
 from paraflex.motion import simulate_motion
 
 m = dict(enumerate([0.04325, 0.00365, 0.02373, 0.00706, 0.07050, 0.00706, 0.05498], 1))

@@ -9,12 +9,7 @@ import pytest
 
 from paraflex.cli.run_lines import below_tolerance
 from paraflex.cli.tables import PlainConsole
-from paraflex.dynamics import (
-    across_chord,
-    build_system,
-    consistent_state,
-    static_equilibrium,
-)
+from paraflex.dynamics import across_chord, build_system, consistent_state, static_equilibrium
 from paraflex.errors import InputError
 from paraflex.fem import ReferenceCondition
 from paraflex.files import load

@@ -10,12 +10,7 @@ import scipy.integrate
 
 import twins
 from conftest import RUBBER
-from paraflex.dynamics import (
-    State,
-    build_system,
-    consistent_state,
-    static_equilibrium,
-)
+from paraflex.dynamics import State, build_system, consistent_state, static_equilibrium
 from paraflex.fem import ReferenceCondition
 from paraflex.integrators import IntegrationOptions
 from paraflex.mechanism import (

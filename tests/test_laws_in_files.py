@@ -14,11 +14,7 @@ import pytest
 import paraflex as pf
 from pages import blocks_of
 from paraflex import SampledController, Simulation
-from paraflex.control import (
-    ControllerDescription,
-    DesignedLQG,
-    simulate_controlled,
-)
+from paraflex.control import ControllerDescription, DesignedLQG, simulate_controlled
 from paraflex.control.laws.kinds import LAWS
 from paraflex.designs.derivatives.plans import check_open_and_whole
 from paraflex.errors import InputError, ResultWarning

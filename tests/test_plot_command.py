@@ -18,12 +18,7 @@ import paraflex as pf
 from made_up import STUDY, made_up, write_study
 from paraflex import plots
 from paraflex.cli.app import app
-from paraflex.control import (
-    ControllerDescription,
-    StateSpaceLaw,
-    simulate_controlled,
-    simulate_controlled_motion,
-)
+from paraflex.control import ControllerDescription, StateSpaceLaw, simulate_controlled, simulate_controlled_motion
 from paraflex.errors import InputError
 from paraflex.figures.designs import undominated
 from paraflex.formatting import logarithmic_number

@@ -13,15 +13,7 @@ from paraflex import formatting
 from paraflex.errors import InputError, OutputError
 from paraflex.formatting import display_units, number as format_number, text_symbol as symbol, typeset
 from paraflex.plots.catalogue import CATALOGUE
-from paraflex.report import (
-    Page,
-    animation,
-    motion_page,
-    render,
-    save_page,
-    tracking_page,
-    verification_page,
-)
+from paraflex.report import Page, animation, motion_page, render, save_page, tracking_page, verification_page
 from paraflex.report.film import MOST_FRAMES, frames_of
 from paraflex.report.packing import Series, packed
 from paraflex.report.page import plotly_script

@@ -6,12 +6,7 @@ import json
 import numpy as np
 import pytest
 
-from paraflex.dynamics import (
-    build_system,
-    consistent_state,
-    moment_signals,
-    start_state,
-)
+from paraflex.dynamics import build_system, consistent_state, moment_signals, start_state
 from paraflex.dynamics.points import point_motion
 from paraflex.dynamics.start import point_rows, static_shape
 from paraflex.dynamics.state import mass_matrix, point_position

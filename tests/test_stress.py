@@ -8,13 +8,7 @@ import numpy as np
 import pytest
 
 import paraflex as pf
-from paraflex.dynamics import (
-    JointMotion,
-    balanced_state,
-    build_system,
-    consistent_state,
-    static_equilibrium,
-)
+from paraflex.dynamics import JointMotion, balanced_state, build_system, consistent_state, static_equilibrium
 from paraflex.dynamics.sections import sections_of
 from paraflex.fem import Polynomial, Sine
 from paraflex.mechanism import (

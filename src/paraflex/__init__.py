@@ -10,8 +10,8 @@ from typing import Any
 
 import lazy_loader
 
-from paraflex.cache_folder import ensure_cache_folder
-from paraflex.late import save_file, view
+from .cache_folder import ensure_cache_folder
+from .late import save_file, view
 
 ensure_cache_folder(Path(__file__).parent / "kernel")
 

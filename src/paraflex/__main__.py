@@ -7,10 +7,10 @@ from contextlib import suppress
 
 def main() -> None:
     """Run the command line; a signal ends it at any time with a one-line message and the exit code of the signal."""
-    from paraflex.cli.signals import exit_code, is_taken, leave_when_signalled
+    from .cli.signals import exit_code, is_taken, leave_when_signalled
 
     leave_when_signalled()
-    from paraflex.cli.app import main as command_line
+    from .cli.app import main as command_line
 
     try:
         command_line()

@@ -21,7 +21,7 @@ from typing import Any, ParamSpec, TypeVar
 
 import numpy as np
 
-from paraflex.errors import InputError, as_enum
+from .errors import InputError, as_enum
 
 P = ParamSpec("P")
 R = TypeVar("R")

@@ -15,26 +15,26 @@ import numpy as np
 from llvmlite import binding
 from numba.core import config
 
-from paraflex.dynamics import State, build_system, constant_signals, pack_signals
-from paraflex.dynamics.state import check_accelerations
-from paraflex.dynamics.tangents import MotionPoint, Tangency
-from paraflex.errors import as_enum
-from paraflex.integrators import IntegrationOptions, make_problem
-from paraflex.integrators.native import NativeRun, prepare
-from paraflex.interrupts import starting_processes
-from paraflex.kernel.march import march
-from paraflex.kernel.notice import LOG, announce_compiling
-from paraflex.kernel.plain import PLAIN, STATE
-from paraflex.kinematics import Line
-from paraflex.mechanism import FlexibleBeam, Geometry, Material, Mechanism, Section, raparm_i
-from paraflex.tracking import plan_tracking
+from .dynamics import State, build_system, constant_signals, pack_signals
+from .dynamics.state import check_accelerations
+from .dynamics.tangents import MotionPoint, Tangency
+from .errors import as_enum
+from .integrators import IntegrationOptions, make_problem
+from .integrators.native import NativeRun, prepare
+from .interrupts import starting_processes
+from .kernel.march import march
+from .kernel.notice import LOG, announce_compiling
+from .kernel.plain import PLAIN, STATE
+from .kinematics import Line
+from .mechanism import FlexibleBeam, Geometry, Material, Mechanism, Section, raparm_i
+from .tracking import plan_tracking
 
 # Script of each child process; its first action makes it end with the parent.
 _CHILD = """
 import sys
-from paraflex.interrupts import end_with_parent
+from .interrupts import end_with_parent
 end_with_parent(sys.stdin.fileno())
-from paraflex.compilation import compile_parts
+from .compilation import compile_parts
 compile_parts(sys.argv[1:])
 """
 

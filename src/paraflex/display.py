@@ -9,8 +9,8 @@ from collections.abc import Container, Iterable, Sequence
 from html import escape
 from typing import Any
 
-from paraflex.formatting import number, typeset
-from paraflex.late import view
+from .formatting import number, typeset
+from .late import view
 
 # Largest number of rows shown of a table that could be long.
 _MOST_LISTED = 60

@@ -22,20 +22,20 @@ from typing import Any
 
 import numpy as np
 
-from paraflex.actuation import FeedForward, actuation_condition
-from paraflex.arguments import checked_arguments
-from paraflex.arrays import Array
-from paraflex.dynamics import System, acting_loads, joint_coordinate, pack_signals, undeformed_motion
-from paraflex.dynamics.points import quarter_turn
-from paraflex.errors import InputError, IntegrationError
-from paraflex.integrators import Solution
-from paraflex.integrators.beam_ends import beyond_ends, end_of_motion
-from paraflex.integrators.linear_structure import Block, Response, march
-from paraflex.integrators.methods import GeneralisedAlpha
-from paraflex.kernel.bodies import motion_forces, system_energy
-from paraflex.kernel.packed import make_scratch
-from paraflex.mechanism import ActuationMode, Geometry, grouped, with_actuators
-from paraflex.tracking import TrackingRun, TrackingTask
+from .actuation import FeedForward, actuation_condition
+from .arguments import checked_arguments
+from .arrays import Array
+from .dynamics import System, acting_loads, joint_coordinate, pack_signals, undeformed_motion
+from .dynamics.points import quarter_turn
+from .errors import InputError, IntegrationError
+from .integrators import Solution
+from .integrators.beam_ends import beyond_ends, end_of_motion
+from .integrators.linear_structure import Block, Response, march
+from .integrators.methods import GeneralisedAlpha
+from .kernel.bodies import motion_forces, system_energy
+from .kernel.packed import make_scratch
+from .mechanism import ActuationMode, Geometry, grouped, with_actuators
+from .tracking import TrackingRun, TrackingTask
 
 # Relative rounding error by which a sample spacing may exceed a whole number of steps.
 _ROUNDED_SPACING = 1e-9

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from enum import Enum
 from typing import Any
 
-from paraflex.errors import ModelWarning, ParaflexWarning, printable, warn_user
+from .errors import ModelWarning, ParaflexWarning, printable, warn_user
 
 # Final statuses of a run that did what was asked.
 DONE_STATUSES = ("complete", "stopped")

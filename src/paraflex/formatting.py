@@ -10,8 +10,8 @@ from collections.abc import Iterable
 
 import numpy as np
 
-from paraflex.arrays import ArrayLike
-from paraflex.units import STRESS, DisplayUnit
+from .arrays import ArrayLike
+from .units import STRESS, DisplayUnit
 
 # Text for a value that does not exist.
 NO_VALUE = "-"

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
-from paraflex.files import load, plan
-from paraflex.files.library import library_names as names, library_text as text
-from paraflex.mechanism.raparm import raparm_i
-from paraflex.mechanism.rows import chain_of_segments, four_bars_in_a_row
+from .files import load, plan
+from .files.library import library_names as names, library_text as text
+from .mechanism.raparm import raparm_i
+from .mechanism.rows import chain_of_segments, four_bars_in_a_row
 
 if TYPE_CHECKING:
-    from paraflex.control.environment import Environment
+    from .control.environment import Environment
 
 __all__ = ["chain_of_segments", "environment", "four_bars_in_a_row", "names", "raparm_i", "text"]
 
@@ -30,6 +30,6 @@ def environment(name: str = "raparm_i", **settings: Any) -> Environment:
     InputError
         The name is unknown, the mechanism has no path, or `pf.Environment` refuses the settings.
     """
-    from paraflex.control.environment import Environment
+    from .control.environment import Environment
 
     return Environment(plan(load(name)), **settings)

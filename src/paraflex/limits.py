@@ -9,7 +9,7 @@ from contextlib import contextmanager
 
 import numpy as np
 
-from paraflex.errors import InputError, ProportionError
+from .errors import InputError, ProportionError
 
 # Size of a model file [bytes]: written by hand it has some kilobytes, with measured data some hundred; a much larger
 # one is a wrong file that takes long to parse.

@@ -7,11 +7,11 @@ from typing import ClassVar
 
 import numpy as np
 
-from paraflex.actuation import Electrical, electrical, electrical_findings
-from paraflex.arguments import checked_arguments, named_in_errors
-from paraflex.arrays import Array
-from paraflex.display import Shown
-from paraflex.dynamics import (
+from .actuation import Electrical, electrical, electrical_findings
+from .arguments import checked_arguments, named_in_errors
+from .arrays import Array
+from .display import Shown
+from .dynamics import (
     JointMotion,
     State,
     System,
@@ -24,15 +24,15 @@ from paraflex.dynamics import (
     standing_system,
     start_state,
 )
-from paraflex.errors import AssemblyError, InputError, IntegrationError, ResultWarning
-from paraflex.findings import Finding, warn_of
-from paraflex.integrators import IntegrationOptions, Method, Solution, check_times, choose, integrate
-from paraflex.kernel.packed import Signals
-from paraflex.kinematics import ModelWithPaths
-from paraflex.mechanism import Mechanism, Start, TimeProfile
-from paraflex.mechanism.loads import InTime, value_in_time
-from paraflex.mechanism.quantities import known
-from paraflex.validity import Validity, assess, implausible_results, large_rotations, warn, with_likely_cause
+from .errors import AssemblyError, InputError, IntegrationError, ResultWarning
+from .findings import Finding, warn_of
+from .integrators import IntegrationOptions, Method, Solution, check_times, choose, integrate
+from .kernel.packed import Signals
+from .kinematics import ModelWithPaths
+from .mechanism import Mechanism, Start, TimeProfile
+from .mechanism.loads import InTime, value_in_time
+from .mechanism.quantities import known
+from .validity import Validity, assess, implausible_results, large_rotations, warn, with_likely_cause
 
 # Remedy for a balanced start that is not found.
 UNBALANCED = "make links and springs stiff enough for weight and loads, or leave it out"

@@ -10,7 +10,7 @@ import hashlib
 from pathlib import Path
 from typing import BinaryIO
 
-from paraflex.errors import InputError
+from .errors import InputError
 
 NETCDF, PARQUET = b"\x89HDF", b"PAR1"
 # The last file without a seal that this process has read, if any; its contents are unchecked.

@@ -7,7 +7,7 @@ from functools import cached_property, partial
 
 import numpy as np
 
-from paraflex.actuation import (
+from .actuation import (
     Effort,
     Electrical,
     FeedForward,
@@ -18,10 +18,10 @@ from paraflex.actuation import (
     plan_torques,
     required_effort,
 )
-from paraflex.arguments import checked_arguments, named_in_errors
-from paraflex.arrays import Array
-from paraflex.display import Shown
-from paraflex.dynamics import (
+from .arguments import checked_arguments, named_in_errors
+from .arrays import Array
+from .display import Shown
+from .dynamics import (
     State,
     System,
     balanced_state,
@@ -32,16 +32,16 @@ from paraflex.dynamics import (
     still_signals,
     undeformed_motion,
 )
-from paraflex.dynamics.points import PointMotion, marker_position, point_motion
-from paraflex.errors import InputError, IntegrationError, ResultWarning, as_enum
-from paraflex.findings import Finding, warn_of
-from paraflex.integrators import IntegrationOptions, Method, Solution, check_times, choose, integrate
-from paraflex.integrators.beam_ends import leave_beam
-from paraflex.integrators.between import SAMPLES
-from paraflex.kinematics import ModelWithPaths, Path, RigidMotion, path_follower
-from paraflex.mechanism import ActuationMode, Mechanism, finite_segments, parse_mode, standing
-from paraflex.mechanism.profiles import stops
-from paraflex.validity import Driven, Following, Validity, assess, implausible_results, warn, with_likely_cause
+from .dynamics.points import PointMotion, marker_position, point_motion
+from .errors import InputError, IntegrationError, ResultWarning, as_enum
+from .findings import Finding, warn_of
+from .integrators import IntegrationOptions, Method, Solution, check_times, choose, integrate
+from .integrators.beam_ends import leave_beam
+from .integrators.between import SAMPLES
+from .kinematics import ModelWithPaths, Path, RigidMotion, path_follower
+from .mechanism import ActuationMode, Mechanism, finite_segments, parse_mode, standing
+from .mechanism.profiles import stops
+from .validity import Driven, Following, Validity, assess, implausible_results, warn, with_likely_cause
 
 # Times closer than this fraction of the run are merged: a knot beside a sample would force a step of almost zero
 # length.

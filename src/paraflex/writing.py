@@ -14,8 +14,8 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
-from paraflex.errors import InputError, OutputError
-from paraflex.seals import check_regular, damaged, seal, unreadable, unsealed, wrong_file
+from .errors import InputError, OutputError
+from .seals import check_regular, damaged, seal, unreadable, unsealed, wrong_file
 
 ELSEWHERE = "choose another folder"
 # Key of a JSON file under which the digest of all other entries is stored.

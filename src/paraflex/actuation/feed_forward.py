@@ -8,12 +8,12 @@ from math import factorial
 import numpy as np
 import scipy
 
-from paraflex.actuation.allocation import PAST_SINGULAR, Effort, allocate, required_effort
 from paraflex.arrays import Array
 from paraflex.dynamics import InputSignals
 from paraflex.errors import Moment, NumericalError
 from paraflex.kinematics import RigidMotion
 from paraflex.mechanism import ActuationMode
+from .allocation import PAST_SINGULAR, Effort, allocate, required_effort
 
 _DEGREE = 5
 # Largest error of the spline, as a fraction of the peak torque of the run.

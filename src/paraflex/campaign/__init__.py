@@ -1,14 +1,14 @@
 """Base classes of studies and results, and for studies of many runs the workers, the journal and the tables."""
 
-from paraflex.campaign.folder import (
+from .folder import (
     STUDY as STUDY,
     TRAJECTORIES as TRAJECTORIES,
     Campaign as Campaign,
     open_campaign as open_campaign,
     read_study as read_study,
 )
-from paraflex.campaign.journal import Journal as Journal, Row as Row
-from paraflex.campaign.study import (
+from .journal import Journal as Journal, Row as Row
+from .study import (
     KeptResult as KeptResult,
     OnProgress as OnProgress,
     Progress as Progress,
@@ -19,7 +19,7 @@ from paraflex.campaign.study import (
     kept_in as kept_in,
     no_workers as no_workers,
 )
-from paraflex.campaign.tables import (
+from .tables import (
     checked_rows as checked_rows,
     read_data as read_data,
     read_table as read_table,
@@ -27,7 +27,7 @@ from paraflex.campaign.tables import (
     table_name as table_name,
     tables_of as tables_of,
 )
-from paraflex.campaign.workers import (
+from .workers import (
     THREADS as THREADS,
     Engine as Engine,
     LostCluster as LostCluster,

@@ -10,14 +10,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from paraflex.campaign.journal import JOURNAL, Journal, Row, write_journal
-from paraflex.campaign.tables import EARLIER, RESULTS, SCHEMA_KEY, UNFINISHED, write_table
 from paraflex.errors import InputError, ResultWarning, warn_user
 from paraflex.folders import STUDY_OF_RUNS, ResultsFolder, check_listed, files_of, foreign_files, hold_folder
 from paraflex.folders.changes import check_inside
 from paraflex.results.tables import read_parquet
 from paraflex.seals import damaged
 from paraflex.writing import GO_ON, read_values, write_json
+from .journal import JOURNAL, Journal, Row, write_journal
+from .tables import EARLIER, RESULTS, SCHEMA_KEY, UNFINISHED, write_table
 
 if TYPE_CHECKING:
     import pyarrow as pa

@@ -11,14 +11,14 @@ from typing import Any, ClassVar, Generic, TypeVar
 import xarray as xr
 
 from paraflex.arguments import CheckedFields
-from paraflex.campaign.folder import STUDY
-from paraflex.campaign.tables import CSV, read_data, table_name
-from paraflex.campaign.workers import THREADS, Engine, open_engine
 from paraflex.display import Shown
 from paraflex.errors import InputError
 from paraflex.folders import STUDY_OF_RUNS, ResultsFolder, hold_folder
 from paraflex.results.storage import write_results
 from paraflex.writing import GO_ON, write_json
+from .folder import STUDY
+from .tables import CSV, read_data, table_name
+from .workers import THREADS, Engine, open_engine
 
 
 @dataclass(frozen=True)

@@ -10,12 +10,12 @@ from typing import TYPE_CHECKING
 
 import xarray as xr
 
-from paraflex.campaign.journal import JOURNAL, Journal, Row, read_journal
 from paraflex.errors import InputError, ResultWarning, warn_user
 from paraflex.interrupts import uninterrupted
 from paraflex.results.tables import open_parquet, read_parquet, spreadsheet_table
 from paraflex.seals import damaged
 from paraflex.writing import GO_ON, whole_file
+from .journal import JOURNAL, Journal, Row, read_journal
 
 if TYPE_CHECKING:
     import pyarrow as pa

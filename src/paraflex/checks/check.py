@@ -6,8 +6,6 @@ from pathlib import Path as FilePath
 from typing import Any
 
 from paraflex.arguments import checked_arguments
-from paraflex.checks.pose import Examination, examine, pose_findings
-from paraflex.checks.study import path_findings, study_findings, task_findings
 from paraflex.dynamics import start_state
 from paraflex.errors import InputError, NumericalError
 from paraflex.files import Model, load
@@ -18,6 +16,8 @@ from paraflex.mechanism import ActuationMode, Mechanism, Start
 from paraflex.tracking import TrackingTask
 from paraflex.units import without_quantities
 from paraflex.validity.numbers import FAST, implausible_numbers, mechanism_size
+from .pose import Examination, examine, pose_findings
+from .study import path_findings, study_findings, task_findings
 
 _NAME = re.compile(r"[^\W\d]\w*")
 

@@ -7,11 +7,11 @@ from pathlib import Path as FilePath
 from typing import TYPE_CHECKING
 
 from paraflex.arguments import checked_arguments
-from paraflex.checks.check import loaded
 from paraflex.errors import InputError, ModelWarning
 from paraflex.files import Model
 from paraflex.mechanism import Mechanism
 from paraflex.results.posed import Posed, posed
+from .check import loaded
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -28,11 +28,9 @@ from paraflex.dynamics.state import point_position
 from paraflex.errors import NumericalError, ProportionError
 from paraflex.findings import Finding
 from paraflex.limits import OUT_OF_PROPORTION
-from paraflex.mechanism import FlexibleBeam, Mechanism, standing
-from paraflex.mechanism.joints import GROUND, PointRef
-from paraflex.validity import large_rotations, stiff_modes
+from paraflex.mechanism import GROUND, FlexibleBeam, Mechanism, PointRef, standing
+from paraflex.validity import large_rotations, mechanism_size, stiff_modes
 from paraflex.validity.actions import numbered_alike
-from paraflex.validity.numbers import mechanism_size
 
 # Natural frequency below that of any link [Hz].
 SLOWEST_LINK = 0.1

@@ -10,15 +10,6 @@ from rich.progress import TimeElapsedColumn
 
 from paraflex.campaign import OnProgress, Progress
 from paraflex.checks import check_planned
-from paraflex.cli.bars import bars
-from paraflex.cli.collected import apart, collected
-from paraflex.cli.commands.runs import RunRequest
-from paraflex.cli.ending import exit_code, print_results, where, write_drawn, write_numbers
-from paraflex.cli.integration import kept_coordinates, reduced_as_requested, run_parameters
-from paraflex.cli.request import acting_controllers, command_provenance, controller_arguments, located_error, plan_study
-from paraflex.cli.run_lines import failures, print_runs
-from paraflex.cli.stops import check_stops
-from paraflex.cli.tables import PlainConsole, warn_of
 from paraflex.compilation import compile_kernels
 from paraflex.control import ControllerDescription, simulate_controlled
 from paraflex.elastodynamics import simulate_ked
@@ -31,6 +22,15 @@ from paraflex.mechanism import ActuationMode, Geometry, Mechanism, proportional_
 from paraflex.results.findings import keep_findings, verdict_of
 from paraflex.studies.tracking import Simulator, StudyResult, TrackingStudy
 from paraflex.tracking import TrackingRun, TrackingTask, simulate
+from .bars import bars
+from .collected import apart, collected
+from .commands.runs import RunRequest
+from .ending import exit_code, print_results, where, write_drawn, write_numbers
+from .integration import kept_coordinates, reduced_as_requested, run_parameters
+from .request import acting_controllers, command_provenance, controller_arguments, located_error, plan_study
+from .run_lines import failures, print_runs
+from .stops import check_stops
+from .tables import PlainConsole, warn_of
 
 
 @dataclass(frozen=True)

@@ -5,13 +5,13 @@ from pathlib import Path
 
 from rich.progress import TaskProgressColumn, TimeRemainingColumn
 
-from paraflex.cli import COMPLETE, signals
-from paraflex.cli.bars import late_bar
-from paraflex.cli.commands.results import AnimateRequest
-from paraflex.cli.replacing import refuse_existing
-from paraflex.cli.tables import PlainConsole
 from paraflex.errors import InputError
 from paraflex.results import open_results
+from . import COMPLETE, signals
+from .bars import late_bar
+from .commands.results import AnimateRequest
+from .replacing import refuse_existing
+from .tables import PlainConsole
 
 # Fields of `FilmOptions` that are passed on unchanged.
 _OPTIONS = ("magnify", "fps", "speed", "theme", "at", "model", "point")

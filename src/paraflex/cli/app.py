@@ -9,14 +9,14 @@ from typing import Annotated, Any
 
 import typer
 
-from paraflex.cli import BAD_INPUT, FAILURE
-from paraflex.cli.collected import collecting
-from paraflex.cli.commands.once import Command
-from paraflex.cli.commands.requests import with_options
-from paraflex.cli.commands.shell import COMMANDS, GROUPS
-from paraflex.cli.signals import exit_code
 from paraflex.errors import InputError, ParaflexError
 from paraflex.seals import unsealed
+from . import BAD_INPUT, FAILURE
+from .collected import collecting
+from .commands.once import Command
+from .commands.requests import with_options
+from .commands.shell import COMMANDS, GROUPS
+from .signals import exit_code
 
 app: typer.Typer = typer.Typer(
     name="paraflex",

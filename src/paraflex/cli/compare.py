@@ -3,15 +3,15 @@
 import time
 from pathlib import Path
 
-from paraflex.cli.commands.requests import flagged
-from paraflex.cli.commands.results import CompareRequest
-from paraflex.cli.ending import print_location, print_results
-from paraflex.cli.replacing import hold_results
-from paraflex.cli.tables import PlainConsole, print_table
 from paraflex.figures.comparison import motion_table, number_table, setting_table
 from paraflex.folders import RUN_COMPARISON
 from paraflex.results.comparison import RunComparison, compare
 from paraflex.writing import write_json
+from .commands.requests import flagged
+from .commands.results import CompareRequest
+from .ending import print_location, print_results
+from .replacing import hold_results
+from .tables import PlainConsole, print_table
 
 
 def compare_command(request: CompareRequest) -> None:

@@ -3,14 +3,6 @@
 import time
 from typing import Any
 
-from paraflex.cli.bars import counting
-from paraflex.cli.commands.requests import flagged
-from paraflex.cli.commands.runs import CompareMethodsRequest
-from paraflex.cli.ending import exit_code, print_location, print_results, write_drawn
-from paraflex.cli.motion import own_motion, start_of
-from paraflex.cli.replacing import hold_results
-from paraflex.cli.request import command_provenance, find_mode, find_path, locating_errors, plan_study, requested_model
-from paraflex.cli.tables import PlainConsole, print_table
 from paraflex.compilation import compile_kernels_for
 from paraflex.dynamics import build_system, consistent_state
 from paraflex.errors import InputError, renamed
@@ -18,12 +10,17 @@ from paraflex.figures.methods import tables
 from paraflex.files import Model
 from paraflex.folders import COMPARISON
 from paraflex.formatting import number
-from paraflex.integrators import METHODS
-from paraflex.integrators.methods import find_method
+from paraflex.integrators import METHODS, find_method
 from paraflex.mechanism import standing
-from paraflex.studies import motion_case, tracking_case
-from paraflex.studies.cases import Case
-from paraflex.studies.compare import ComparisonOptions, ComparisonStudy
+from paraflex.studies import Case, ComparisonOptions, ComparisonStudy, motion_case, tracking_case
+from .bars import counting
+from .commands.requests import flagged
+from .commands.runs import CompareMethodsRequest
+from .ending import exit_code, print_location, print_results, write_drawn
+from .motion import own_motion, start_of
+from .replacing import hold_results
+from .request import command_provenance, find_mode, find_path, locating_errors, plan_study, requested_model
+from .tables import PlainConsole, print_table
 
 
 def compare_methods_command(request: CompareMethodsRequest) -> int:

@@ -7,21 +7,6 @@ import xarray as xr
 
 from paraflex.campaign import Workers
 from paraflex.checks import check_planned
-from paraflex.cli.bars import counting
-from paraflex.cli.collected import collected
-from paraflex.cli.commands.requests import flagged
-from paraflex.cli.commands.runs import CompareLawsRequest
-from paraflex.cli.ending import exit_code, print_location, print_results, write_drawn
-from paraflex.cli.replacing import hold_results
-from paraflex.cli.request import (
-    command_provenance,
-    find_modes,
-    find_paths,
-    locating_errors,
-    plan_study,
-    requested_model,
-)
-from paraflex.cli.tables import PlainConsole, print_table
 from paraflex.compilation import compile_kernels_for
 from paraflex.control import ControllerDescription
 from paraflex.figures.laws import law_table
@@ -33,6 +18,14 @@ from paraflex.results.following import ErrorSpan
 from paraflex.results.metrics import VALIDITY
 from paraflex.studies.law_comparison import LawComparison
 from paraflex.studies.laws import LawStudy, laws_of, reduced_tasks
+from .bars import counting
+from .collected import collected
+from .commands.requests import flagged
+from .commands.runs import CompareLawsRequest
+from .ending import exit_code, print_location, print_results, write_drawn
+from .replacing import hold_results
+from .request import command_provenance, find_modes, find_paths, locating_errors, plan_study, requested_model
+from .tables import PlainConsole, print_table
 
 Laws = dict[str, tuple[ControllerDescription, ...]]
 Paths = dict[str, Path]

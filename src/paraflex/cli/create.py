@@ -4,11 +4,11 @@ import json
 import re
 from pathlib import Path
 
-from paraflex.cli.commands.models import NewRequest, SchemaRequest
-from paraflex.cli.tables import PlainConsole
 from paraflex.errors import OutputError, renamed
 from paraflex.files import library_text, model_schema
 from paraflex.writing import write_text
+from .commands.models import NewRequest, SchemaRequest
+from .tables import PlainConsole
 
 
 def new_command(request: NewRequest) -> None:

@@ -14,16 +14,16 @@ from typing import TYPE_CHECKING
 from rich.table import Table
 
 from paraflex.checks.drawing import pose_of
-from paraflex.cli.commands.models import DrawRequest
-from paraflex.cli.replacing import refuse_existing
-from paraflex.cli.request import requested_model
-from paraflex.cli.tables import PlainConsole, framed_table
 from paraflex.equilibria.conditions import StaticsDefaults
 from paraflex.errors import InputError, listed
 from paraflex.files import Model
 from paraflex.mechanism import Mechanism
 from paraflex.results.acting import acting_load, drive_speed
 from paraflex.writing import portable_name, whole_file
+from .commands.models import DrawRequest
+from .replacing import refuse_existing
+from .request import requested_model
+from .tables import PlainConsole, framed_table
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

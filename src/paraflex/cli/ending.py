@@ -9,16 +9,16 @@ from typing import Any
 
 import xarray as xr
 
-from paraflex.cli import COMPLETE, FAILURE, signals
-from paraflex.cli.commands.options import DrawnChoice, FilesChoice
-from paraflex.cli.replacing import hold_results
-from paraflex.cli.tables import PlainConsole, warn_of
 from paraflex.errors import OutputError
 from paraflex.findings import Finding
 from paraflex.folders import RESULT_KINDS, ResultsFolder
 from paraflex.results import save_results
 from paraflex.results.kinds import kind_of
 from paraflex.writing import write_json
+from . import COMPLETE, FAILURE, signals
+from .commands.options import DrawnChoice, FilesChoice
+from .replacing import hold_results
+from .tables import PlainConsole, warn_of
 
 _LATER = "paraflex plot and paraflex report draw them"
 _FIGURES = DrawnChoice(report=False)
@@ -80,7 +80,7 @@ def write_drawn(results: xr.Dataset | Mapping[str, Any], folder: ResultsFolder, 
 
                 save_figures(results, new / "figures")
             if drawn.report and isinstance(results, xr.Dataset):
-                from paraflex.cli.report import page_of, save_page  # as does this one
+                from .report import page_of, save_page  # as does this one
 
                 save_page(page_of(results, folder.path), new / "report.html")
     except KeyboardInterrupt as interrupt:

@@ -2,11 +2,11 @@
 
 from pathlib import Path
 
-from paraflex.cli.commands.requests import flagged
-from paraflex.cli.commands.results import ExportRequest
-from paraflex.cli.tables import PlainConsole
 from paraflex.results import open_results
 from paraflex.results.export import export, export_table
+from .commands.requests import flagged
+from .commands.results import ExportRequest
+from .tables import PlainConsole
 
 _TABLE = "results.parquet"
 

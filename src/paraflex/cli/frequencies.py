@@ -6,8 +6,6 @@ import numpy as np
 
 from paraflex.arrays import Array
 from paraflex.checks import BALANCED
-from paraflex.cli.commands.models import InfoRequest
-from paraflex.cli.request import check_time
 from paraflex.dynamics import (
     State,
     System,
@@ -23,6 +21,8 @@ from paraflex.errors import AssemblyError, InputError
 from paraflex.files import Model
 from paraflex.kinematics import follow_path
 from paraflex.motion import UNBALANCED
+from .commands.models import InfoRequest
+from .request import check_time
 
 
 def frequencies(

@@ -6,11 +6,6 @@ from contextlib import suppress
 from typing import Any
 
 from paraflex.checks import check, examine
-from paraflex.cli.collected import printed
-from paraflex.cli.commands.models import InfoRequest
-from paraflex.cli.frequencies import frequencies, hertz
-from paraflex.cli.inspect_tables import print_facts, print_library
-from paraflex.cli.request import requested_model
 from paraflex.dynamics import Closure, DrivenFreedoms, Mobility, System, build_system, closure_of, mobility
 from paraflex.errors import ProportionError
 from paraflex.files import Model, library_names, load
@@ -30,6 +25,11 @@ from paraflex.mechanism import (
     grouped,
     loops,
 )
+from .collected import printed
+from .commands.models import InfoRequest
+from .frequencies import frequencies, hertz
+from .inspect_tables import print_facts, print_library
+from .request import requested_model
 
 # Largest number of loops and of redundant constraints listed.
 _LISTED = 1000

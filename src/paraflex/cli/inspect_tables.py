@@ -6,11 +6,11 @@ from typing import Any
 from rich.padding import Padding
 from rich.table import Table
 
-from paraflex.cli.tables import PlainConsole, framed_table
 from paraflex.errors import listed
 from paraflex.files import generator_names
 from paraflex.findings import Level
 from paraflex.mechanism import Mechanism, groups_of
+from .tables import PlainConsole, framed_table
 
 _FREQUENCIES_SHOWN = 3
 _LISTED = 12

@@ -4,10 +4,6 @@ from collections.abc import Sequence
 from dataclasses import asdict
 from typing import Any
 
-from paraflex.cli.commands.requests import flags
-from paraflex.cli.commands.runs import RunRequest
-from paraflex.cli.request import conflict
-from paraflex.cli.stops import number_in_option, parse_event
 from paraflex.errors import InputError
 from paraflex.files import StudyDefaults
 from paraflex.integrators import IntegrationOptions, Treatment
@@ -15,6 +11,10 @@ from paraflex.mechanism import ActuationMode, Mechanism
 from paraflex.motion import MotionRun
 from paraflex.reduced_bodies import reduced_mechanism
 from paraflex.tracking import TrackingTask
+from .commands.requests import flags
+from .commands.runs import RunRequest
+from .request import conflict
+from .stops import number_in_option, parse_event
 
 # Fields of a request that `IntegrationOptions` also has, and fields that kineto-elastodynamics does not use.
 _OPTIONS = (

@@ -3,11 +3,6 @@
 import numpy as np
 import xarray as xr
 
-from paraflex.cli.commands.models import LineariseRequest, ReduceRequest
-from paraflex.cli.commands.requests import flagged
-from paraflex.cli.ending import give_dataset
-from paraflex.cli.linear_models import RequestedModels, moments_along, requested_models, requested_pose
-from paraflex.cli.tables import PlainConsole, print_table
 from paraflex.errors import InputError, renamed
 from paraflex.figures import linear, reduction
 from paraflex.figures.selection import names_of
@@ -17,6 +12,11 @@ from paraflex.results.linear_data import linear_dataset
 from paraflex.results.linear_summary import about, linear_summary, remarks, roots, zeros_of
 from paraflex.results.reduction_data import reduction_dataset
 from paraflex.results.reduction_summary import reduction_summary
+from .commands.models import LineariseRequest, ReduceRequest
+from .commands.requests import flagged
+from .ending import give_dataset
+from .linear_models import RequestedModels, moments_along, requested_models, requested_pose
+from .tables import PlainConsole, print_table
 
 # Methods of reduction that are compared by default.
 _METHODS = (ReductionMethod.CRAIG_BAMPTON.value, ReductionMethod.MODAL.value)

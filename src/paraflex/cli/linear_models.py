@@ -7,21 +7,6 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from paraflex.checks import BALANCED
-from paraflex.cli.commands.models import LinearRequest
-from paraflex.cli.commands.options import PlanChoice
-from paraflex.cli.commands.requests import flagged
-from paraflex.cli.request import (
-    check_time,
-    command_provenance,
-    conflict,
-    find_modes,
-    find_path,
-    locating_errors,
-    of_assembly,
-    plan_study,
-    requested_model,
-)
-from paraflex.cli.tables import PlainConsole
 from paraflex.compilation import compile_kernels_for
 from paraflex.dynamics import State, build_system, pose_at_rest, standing_system, undeformed
 from paraflex.errors import ActuationError, AssemblyError, InputError
@@ -34,6 +19,21 @@ from paraflex.mechanism import ActuationMode, Mechanism
 from paraflex.motion import UNBALANCED, MotionRun, simulate_motion
 from paraflex.results.linear_data import motors_of
 from paraflex.tracking import TrackingRun, TrackingTask
+from .commands.models import LinearRequest
+from .commands.options import PlanChoice
+from .commands.requests import flagged
+from .request import (
+    check_time,
+    command_provenance,
+    conflict,
+    find_modes,
+    find_path,
+    locating_errors,
+    of_assembly,
+    plan_study,
+    requested_model,
+)
+from .tables import PlainConsole
 
 Motion = TrackingTask | TrackingRun | MotionRun
 ALL, START = "all", "start"
@@ -75,7 +75,7 @@ def _of_results(request: LinearRequest, command: str) -> Callable[[], RequestedM
                 "has no effect on results, which are already computed", field=flag, value=str(value),
                 remedy="leave it out, or name the model",
             )  # fmt: skip
-    from paraflex.cli.repeated import repeated_runs  # imports the reports, which rebuild the command of a run
+    from .repeated import repeated_runs  # imports the reports, which rebuild the command of a run
 
     model, runs = repeated_runs(request.model.name, [] if ALL in request.modes else request.modes)
 

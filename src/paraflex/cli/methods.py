@@ -7,9 +7,9 @@ from typing import Any
 
 from rich.table import Table
 
-from paraflex.cli.commands.models import MethodsRequest
-from paraflex.cli.tables import PlainConsole, plain_table
 from paraflex.integrators import DEFAULT_METHOD, METHODS, Method
+from .commands.models import MethodsRequest
+from .tables import PlainConsole, plain_table
 
 
 def methods_command(request: MethodsRequest) -> None:

@@ -10,15 +10,15 @@ import numpy as np
 
 from paraflex.actuation import Effort, actuation_condition
 from paraflex.actuation.allocation import check_mode
-from paraflex.cli.commands.models import ModesRequest
-from paraflex.cli.request import find_path, requested_model
-from paraflex.cli.tables import PlainConsole, print_table
 from paraflex.dynamics import build_system, closure_of, driven_freedoms, mobility
 from paraflex.errors import ActuationError
 from paraflex.figures.modes import mode_table
 from paraflex.files import Model
 from paraflex.mechanism import ActuationMode, mode_of_motors, parse_mode
 from paraflex.results.numbers import finite_or_none
+from .commands.models import ModesRequest
+from .request import find_path, requested_model
+from .tables import PlainConsole, print_table
 
 # Number of samples of the path at which modes are assessed.
 _SAMPLES = 201

@@ -8,16 +8,6 @@ from dataclasses import asdict, replace
 from rich.progress import TimeElapsedColumn
 
 from paraflex.checks import check
-from paraflex.cli.bars import late_bar
-from paraflex.cli.collected import collected
-from paraflex.cli.commands.options import PlanChoice
-from paraflex.cli.commands.runs import RunRequest
-from paraflex.cli.ending import exit_code, print_location, print_results, write_drawn, write_numbers
-from paraflex.cli.integration import kept_coordinates, reduced_as_requested, run_parameters
-from paraflex.cli.replacing import hold_results
-from paraflex.cli.request import acting_controllers, command_provenance, controller_arguments, locating_errors
-from paraflex.cli.run_lines import load_lines
-from paraflex.cli.tables import PlainConsole, print_table
 from paraflex.compilation import compile_kernels_for
 from paraflex.control import ControllerDescription
 from paraflex.designs.own_motion import own_run
@@ -37,6 +27,16 @@ from paraflex.reduced_bodies import size_of
 from paraflex.results import motion_dataset, motion_summary
 from paraflex.results.findings import validity_line
 from paraflex.results.reduced_runs import compared_with_full
+from .bars import late_bar
+from .collected import collected
+from .commands.options import PlanChoice
+from .commands.runs import RunRequest
+from .ending import exit_code, print_location, print_results, write_drawn, write_numbers
+from .integration import kept_coordinates, reduced_as_requested, run_parameters
+from .replacing import hold_results
+from .request import acting_controllers, command_provenance, controller_arguments, locating_errors
+from .run_lines import load_lines
+from .tables import PlainConsole, print_table
 
 # Largest number of singular positions listed.
 _MOST_TIMES = 4

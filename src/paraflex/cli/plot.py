@@ -5,10 +5,10 @@ from pathlib import Path
 
 import typer
 
-from paraflex.cli.commands.results import PlotRequest
 from paraflex.errors import InputError, suggestion
 from paraflex.plots.planned import drawings, figures_of, find_figure
 from paraflex.plots.sources import Source, open_source
+from .commands.results import PlotRequest
 
 ALL = "all"
 STYLES = ("single", "double")

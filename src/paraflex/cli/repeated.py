@@ -8,14 +8,6 @@ from functools import partial
 import xarray as xr
 from typer.main import Typer, get_command
 
-from paraflex.cli.along import own_method, requested_tasks
-from paraflex.cli.commands.requests import filled, with_options
-from paraflex.cli.commands.runs import RunRequest
-from paraflex.cli.integration import integration_options
-from paraflex.cli.motion import own_motion, start_of
-from paraflex.cli.request import acting_controllers, find_path, requested_model
-from paraflex.cli.run import requested_mechanism
-from paraflex.cli.tables import PlainConsole
 from paraflex.compilation import compile_kernels_for
 from paraflex.designs.own_motion import own_run
 from paraflex.errors import InputError
@@ -26,6 +18,14 @@ from paraflex.report.provenance import asked, command_line
 from paraflex.results.kinds import kind_of
 from paraflex.results.storage import open_results
 from paraflex.tracking import TrackingRun, simulate
+from .along import own_method, requested_tasks
+from .commands.requests import filled, with_options
+from .commands.runs import RunRequest
+from .integration import integration_options
+from .motion import own_motion, start_of
+from .request import acting_controllers, find_path, requested_model
+from .run import requested_mechanism
+from .tables import PlainConsole
 
 _OTHER = "name the folder of paraflex run"
 

@@ -6,7 +6,6 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from paraflex.cli.tables import PlainConsole
 from paraflex.errors import InputError, listed
 from paraflex.folders import (
     COMPARISON,
@@ -20,6 +19,7 @@ from paraflex.folders import (
     kind_of_folder,
 )
 from paraflex.writing import read_json
+from .tables import PlainConsole
 
 # Largest number of foreign files that are named.
 _NAMED = 3

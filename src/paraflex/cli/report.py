@@ -5,13 +5,13 @@ from pathlib import Path
 
 import xarray as xr
 
-from paraflex.cli.commands.results import ReportRequest
-from paraflex.cli.tables import PlainConsole
 from paraflex.errors import InputError
 from paraflex.folders import RESULT_KINDS
 from paraflex.report import Page, save_page
 from paraflex.results.kinds import kind_of
 from paraflex.results.storage import open_results, results_file
+from .commands.results import ReportRequest
+from .tables import PlainConsole
 
 
 def report_command(request: ReportRequest) -> None:

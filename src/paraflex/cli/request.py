@@ -6,9 +6,6 @@ from contextlib import contextmanager
 from dataclasses import asdict
 from typing import Any
 
-from paraflex.cli.commands.options import FramesChoice, ModelChoice, PlanChoice
-from paraflex.cli.commands.requests import flagged
-from paraflex.cli.commands.runs import RunRequest
 from paraflex.control.laws.described import NONE, ControllerDescription
 from paraflex.errors import AssemblyError, InputError, UnreachablePathError, renamed
 from paraflex.files import Model, load, load_path
@@ -18,6 +15,9 @@ from paraflex.kinematics import Path as EndEffectorPath
 from paraflex.mechanism import ActuationMode, Mechanism
 from paraflex.tracking import TrackingTask
 from paraflex.validity import likely_cause
+from .commands.options import FramesChoice, ModelChoice, PlanChoice
+from .commands.requests import flagged
+from .commands.runs import RunRequest
 
 
 def requested_model(choice: ModelChoice) -> Model:

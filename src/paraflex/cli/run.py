@@ -5,19 +5,19 @@ from contextlib import ExitStack
 from dataclasses import asdict
 from pathlib import Path
 
-from paraflex.cli.along import run_along
-from paraflex.cli.commands.requests import flagged
-from paraflex.cli.commands.runs import RunRequest
-from paraflex.cli.integration import given_flags, integration_options
-from paraflex.cli.motion import run_motion
-from paraflex.cli.replacing import hold_results
-from paraflex.cli.request import conflict, find_modes, find_paths, requested_model, with_frames
-from paraflex.cli.stops import check_stops
 from paraflex.errors import InputError
 from paraflex.files import Model
 from paraflex.folders import RUN
 from paraflex.mechanism import Mechanism, finite_segments, proportional_segments
 from paraflex.writing import portable_name
+from .along import run_along
+from .commands.requests import flagged
+from .commands.runs import RunRequest
+from .integration import given_flags, integration_options
+from .motion import run_motion
+from .replacing import hold_results
+from .request import conflict, find_modes, find_paths, requested_model, with_frames
+from .stops import check_stops
 
 
 def run_command(request: RunRequest) -> int:

@@ -3,7 +3,6 @@
 from collections.abc import Mapping
 from typing import Any
 
-from paraflex.cli.tables import PlainConsole, print_table
 from paraflex.figures.controllers import controller_table
 from paraflex.figures.loads import stress_table
 from paraflex.figures.reduction import reduced_runs_table, reduced_words
@@ -14,6 +13,7 @@ from paraflex.results.following import HEADLINE, ErrorSpan, below_tolerance_line
 from paraflex.results.loads import effort_lines, joint_line, stress_line
 from paraflex.studies.tracking import StudyResult
 from paraflex.tracking import TrackingTask
+from .tables import PlainConsole, print_table
 
 
 def print_runs(out: PlainConsole, results: Mapping[str, StudyResult], task: TrackingTask, model: str) -> None:

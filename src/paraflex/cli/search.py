@@ -5,11 +5,6 @@ from pathlib import Path
 from typing import TypeVar
 
 from paraflex.campaign import Progress
-from paraflex.cli import signals
-from paraflex.cli.bars import bars
-from paraflex.cli.commands.studies import SearchRequest
-from paraflex.cli.ending import exit_code, print_results
-from paraflex.cli.tables import PlainConsole, print_table
 from paraflex.compilation import compile_kernels_for
 from paraflex.figures.designs import column_label
 from paraflex.figures.search import tables
@@ -18,6 +13,11 @@ from paraflex.studies import load_identification, load_optimisation
 from paraflex.studies.optimisation.identify import IdentificationResult
 from paraflex.studies.optimisation.optimise import OptimisationResult
 from paraflex.studies.optimisation.study import DesignStudy
+from . import signals
+from .bars import bars
+from .commands.studies import SearchRequest
+from .ending import exit_code, print_results
+from .tables import PlainConsole, print_table
 
 R = TypeVar("R", OptimisationResult, IdentificationResult)
 

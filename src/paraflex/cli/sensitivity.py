@@ -2,11 +2,6 @@
 
 from dataclasses import replace
 
-from paraflex.cli import COMPLETE
-from paraflex.cli.commands.studies import SensitivityRequest
-from paraflex.cli.ending import print_results, write_drawn
-from paraflex.cli.replacing import hold_results
-from paraflex.cli.tables import PlainConsole, print_table
 from paraflex.designs.setting import Setting
 from paraflex.designs.units import check_unit_of
 from paraflex.errors import InputError
@@ -15,6 +10,11 @@ from paraflex.files.expressions import ExpressionError, evaluate
 from paraflex.folders import SENSITIVITY
 from paraflex.studies import load_sensitivities
 from paraflex.studies.sensitivities.study import FIGURES, LINES, TABLE
+from . import COMPLETE
+from .commands.studies import SensitivityRequest
+from .ending import print_results, write_drawn
+from .replacing import hold_results
+from .tables import PlainConsole, print_table
 
 # Number of parameters side by side in a table of 80 columns.
 _PARAMETERS_ABREAST = 4

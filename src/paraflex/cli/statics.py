@@ -7,12 +7,6 @@ from functools import partial
 import numpy as np
 import xarray as xr
 
-from paraflex.cli import COMPLETE, FAILURE
-from paraflex.cli.commands.models import StaticsRequest
-from paraflex.cli.commands.requests import flagged
-from paraflex.cli.ending import give_dataset
-from paraflex.cli.request import command_provenance, of_assembly, requested_model
-from paraflex.cli.tables import PlainConsole, print_tables
 from paraflex.equilibria import StaticsDefaults, statics
 from paraflex.equilibria.conditions import coordinate_named
 from paraflex.errors import AssemblyError, EquilibriumError, InputError, renamed
@@ -21,6 +15,12 @@ from paraflex.files import Model
 from paraflex.files.fields import number_in
 from paraflex.formatting import number, quantity
 from paraflex.results.statics_data import statics_dataset, statics_summary
+from . import COMPLETE, FAILURE
+from .commands.models import StaticsRequest
+from .commands.requests import flagged
+from .ending import give_dataset
+from .request import command_provenance, of_assembly, requested_model
+from .tables import PlainConsole, print_tables
 
 
 def statics_command(request: StaticsRequest) -> int:

@@ -7,14 +7,7 @@ from typing import Any
 from paraflex.errors import InputError
 from paraflex.files.expressions import ExpressionError, evaluate
 from paraflex.files.fields import check_unit
-from paraflex.integrators import (
-    DeflectionLimit,
-    Event,
-    IntegrationOptions,
-    JointLimit,
-    SingularDistance,
-    check_events,
-)
+from paraflex.integrators import DeflectionLimit, Event, IntegrationOptions, JointLimit, SingularDistance, check_events
 from paraflex.mechanism import Mechanism
 from paraflex.units import quantities_in
 

@@ -5,18 +5,17 @@ from pathlib import Path
 from typing import Any
 
 from paraflex.campaign import Progress
-from paraflex.cli import COMPLETE, signals
-from paraflex.cli.bars import bars
-from paraflex.cli.commands.studies import IndicesRequest, SweepRequest
-from paraflex.cli.ending import exit_code, print_results
-from paraflex.cli.tables import PlainConsole, print_table
 from paraflex.compilation import compile_kernels_for
 from paraflex.designs.measure import beyond_limits, coarse_runs
 from paraflex.designs.sweep import SweepResult, SweepStudy
 from paraflex.figures.search import index_table
 from paraflex.formatting import number, quantity
-from paraflex.studies import load_indices, load_sweep
-from paraflex.studies.optimisation.indices import IndicesResult
+from paraflex.studies import IndicesResult, load_indices, load_sweep
+from . import COMPLETE, signals
+from .bars import bars
+from .commands.studies import IndicesRequest, SweepRequest
+from .ending import exit_code, print_results
+from .tables import PlainConsole, print_table
 
 
 def sweep_command(request: SweepRequest) -> int:
@@ -53,7 +52,7 @@ def _sweep(console: PlainConsole, study: SweepStudy, folder: Path, request: Swee
 
 def _write_report(console: PlainConsole, folder: Path, result: SweepResult) -> None:
     """Write the report, unless the sweep was interrupted: the user should not have to wait for it."""
-    from paraflex.cli.report import save_study_report
+    from .report import save_study_report
 
     if result.interrupted:
         console.print_lines(f"no report: paraflex report {folder} writes it")

@@ -11,9 +11,9 @@ from rich.console import Console, ConsoleOptions, RenderableType
 from rich.segment import Segment
 from rich.table import Table
 
-from paraflex.cli.collected import printed
 from paraflex.errors import printable
 from paraflex.findings import Finding
+from .collected import printed
 
 if TYPE_CHECKING:
     # Its import takes as long as all of `paraflex info`.

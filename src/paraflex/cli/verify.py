@@ -3,21 +3,6 @@
 import time
 from dataclasses import asdict
 
-from paraflex.cli.bars import counting
-from paraflex.cli.commands.requests import flagged
-from paraflex.cli.commands.runs import VerifyRequest
-from paraflex.cli.ending import exit_code, print_location, print_results, write_drawn
-from paraflex.cli.replacing import hold_results
-from paraflex.cli.request import (
-    command_provenance,
-    find_mode,
-    find_modes,
-    find_path,
-    plan_study,
-    requested_model,
-    with_frames,
-)
-from paraflex.cli.tables import PlainConsole, print_table
 from paraflex.compilation import compile_kernels
 from paraflex.engines import ENGINES
 from paraflex.errors import InputError, suggestion
@@ -26,6 +11,13 @@ from paraflex.folders import VERIFICATION
 from paraflex.mechanism import Geometry
 from paraflex.results.following import SPAN_WORDS, ErrorSpan
 from paraflex.studies.verification import FIDELITIES, VerificationOptions, VerificationStudy, check_model
+from .bars import counting
+from .commands.requests import flagged
+from .commands.runs import VerifyRequest
+from .ending import exit_code, print_location, print_results, write_drawn
+from .replacing import hold_results
+from .request import command_provenance, find_mode, find_modes, find_path, plan_study, requested_model, with_frames
+from .tables import PlainConsole, print_table
 
 
 def verify_command(request: VerifyRequest) -> int:

@@ -4,8 +4,6 @@ Gymnasium is an optional dependency: this module can be imported without it, but
 environment "paraflex/RAParM-I-v0" is registered.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from typing import TYPE_CHECKING, Any
@@ -14,9 +12,6 @@ import numpy as np
 
 from paraflex.arguments import checked_arguments
 from paraflex.arrays import Array, Numbers
-from paraflex.control.loop.simulation import Simulation
-from paraflex.control.loop.together import by_name, checked_number, periods_in, real_numbers
-from paraflex.control.observations import WIDEST, Observer, observed_sensors
 from paraflex.dynamics import State
 from paraflex.dynamics.points import marker_position
 from paraflex.errors import InputError, IntegrationError
@@ -26,6 +21,9 @@ from paraflex.mechanism import ActuationMode, Mechanism, Start
 from paraflex.mechanism.measured import measured_sensors
 from paraflex.mechanism.quantities import not_negative, positive
 from paraflex.tracking import TrackingTask
+from .loop.simulation import Simulation
+from .loop.together import by_name, checked_number, periods_in, real_numbers
+from .observations import WIDEST, Observer, observed_sensors
 
 if TYPE_CHECKING:
     from gymnasium import Env, Space
@@ -33,7 +31,7 @@ else:
     try:
         from gymnasium import Env
     except ImportError:
-        from paraflex.control.no_gymnasium import Env
+        from .no_gymnasium import Env
 
 Reward = Callable[[Simulation, Mapping[str, float], Array], float]
 # With feed-forward, actions are corrections: default limits as a fraction of its largest torque.

@@ -5,14 +5,14 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from paraflex.arrays import Array
-from paraflex.control.laws.estimators import rounded
-from paraflex.control.loop.references import readings_of
-from paraflex.control.loop.simulation import Simulation
 from paraflex.errors import InputError
 from paraflex.mechanism import Mechanism
 from paraflex.mechanism.measured import encoders_of
 from paraflex.mechanism.quantities import all_known, known
 from paraflex.tracking import TrackingTask
+from .laws.estimators import rounded
+from .loop.references import readings_of
+from .loop.simulation import Simulation
 
 # Observations are clipped to this magnitude, as observation spaces must be bounded; readings of a run that has not
 # diverged stay far below.

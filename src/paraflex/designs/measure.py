@@ -1,7 +1,5 @@
 """Metrics of runs as columns of a table, and as smooth functions of a perturbed run."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 

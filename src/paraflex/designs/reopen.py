@@ -8,11 +8,11 @@ from typing import Any
 import xarray as xr
 
 from paraflex.campaign import STUDY, read_study
-from paraflex.designs.measure import measure
-from paraflex.designs.run import Task, dataset_of, ready, run_mode
-from paraflex.designs.samples import SweptParameter
-from paraflex.designs.setting import Setting, digest, versions
 from paraflex.errors import InputError
+from .measure import measure
+from .run import Task, dataset_of, ready, run_mode
+from .samples import SweptParameter
+from .setting import Setting, digest, versions
 
 _AGAIN = "run the study again, in a new folder"
 

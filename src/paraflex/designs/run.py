@@ -13,9 +13,6 @@ import xarray as xr
 from paraflex.campaign import Row
 from paraflex.compilation import compile_kernels_for
 from paraflex.control import ControllerDescription, simulate_controlled
-from paraflex.designs.measure import Runs, coarseness, measure
-from paraflex.designs.own_motion import own_run
-from paraflex.designs.setting import Setting, digest, versions
 from paraflex.dynamics import build_system
 from paraflex.equilibria import Statics, statics
 from paraflex.errors import InputError, NumericalError
@@ -27,6 +24,9 @@ from paraflex.reduced_bodies import reduced_mechanism
 from paraflex.results import motion_dataset, statics_dataset, tracking_dataset
 from paraflex.results.metrics import METRICS, Members
 from paraflex.tracking import TrackingTask, simulate
+from .measure import Runs, coarseness, measure
+from .own_motion import own_run
+from .setting import Setting, digest, versions
 
 if TYPE_CHECKING:
     import pyarrow as pa

@@ -9,11 +9,6 @@ from importlib.metadata import version
 from pathlib import Path as FilePath
 from typing import Any
 
-from paraflex.designs.measure import metrics_of
-from paraflex.designs.own_motion import own_duration
-from paraflex.designs.samples import SweptParameter
-from paraflex.designs.schema import SweepTable, VaryTable, check_of_statics
-from paraflex.designs.units import check_unit_of, unit_of
 from paraflex.equilibria.conditions import chosen_over
 from paraflex.errors import InputError, suggestion, within
 from paraflex.files import Model, StudyDefaults, library_names, model_from
@@ -31,6 +26,11 @@ from paraflex.results.dataset import part_of
 from paraflex.results.following import PathPart
 from paraflex.results.metrics import METRICS, MOTION, PATH, STATICS, Members, metric_unit
 from paraflex.validity import implausible_numbers
+from .measure import metrics_of
+from .own_motion import own_duration
+from .samples import SweptParameter
+from .schema import SweepTable, VaryTable, check_of_statics
+from .units import check_unit_of, unit_of
 
 # Default limit of attempted steps, so that a single design with violent motion does not delay a study.
 DESIGN_MOST_STEPS = 200_000

@@ -29,22 +29,6 @@ from paraflex.campaign import (
     table_name,
 )
 from paraflex.compilation import compile_kernels_for
-from paraflex.designs.measure import members_of
-from paraflex.designs.reopen import study_account
-from paraflex.designs.run import (
-    STATUS_COMPLETE,
-    Outcome,
-    RunTask,
-    Task,
-    is_row_of,
-    lost,
-    run_id,
-    run_task,
-    table_schema,
-)
-from paraflex.designs.samples import SweptParameter, check_varied, designs
-from paraflex.designs.schema import SweepTable, study_table
-from paraflex.designs.setting import Setting, make_setting
 from paraflex.equilibria.conditions import conditions
 from paraflex.errors import InputError
 from paraflex.files import Model, model_from
@@ -53,6 +37,12 @@ from paraflex.results.metrics import VALIDITY, Members
 from paraflex.results.storage import write_results
 from paraflex.results.tables import read_parquet
 from paraflex.writing import GO_ON, write_json
+from .measure import members_of
+from .reopen import study_account
+from .run import STATUS_COMPLETE, Outcome, RunTask, Task, is_row_of, lost, run_id, run_task, table_schema
+from .samples import SweptParameter, check_varied, designs
+from .schema import SweepTable, study_table
+from .setting import Setting, make_setting
 
 
 @dataclass(frozen=True)

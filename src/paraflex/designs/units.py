@@ -5,10 +5,10 @@ from typing import Any
 
 from pydantic import BaseModel
 
-from paraflex.designs.schema import SweepTable
 from paraflex.files.fields import Place, check_unit, field_at, units_at
 from paraflex.files.schema import ModelTable, NumberOfText
 from paraflex.results.metrics import Members, metric_unit
+from .schema import SweepTable
 
 
 def unit_of(data: Mapping[str, Any], place: Place) -> str:

@@ -1,42 +1,31 @@
 """Equations of motion of a mechanism: its system of constant arrays, consistent states, equilibria, linearisation."""
 
-from paraflex.dynamics.brake import BrakedSystem as BrakedSystem, brake as brake
-from paraflex.dynamics.coordinates import (
+from .brake import BrakedSystem as BrakedSystem, brake as brake
+from .coordinates import (
     BodyCoordinates as BodyCoordinates,
     Marker as Marker,
     end_markers as end_markers,
     node_marker as node_marker,
 )
-from paraflex.dynamics.drive import DrivenFreedoms as DrivenFreedoms, driven_freedoms as driven_freedoms
-from paraflex.dynamics.equilibrium import static_equilibrium as static_equilibrium
-from paraflex.dynamics.inputs import Inputs as Inputs, inputs_of as inputs_of
-from paraflex.dynamics.joint_coordinates import (
+from .drive import DrivenFreedoms as DrivenFreedoms, driven_freedoms as driven_freedoms
+from .equilibrium import static_equilibrium as static_equilibrium
+from .inputs import Inputs as Inputs, inputs_of as inputs_of
+from .joint_coordinates import (
     JointCoordinate as JointCoordinate,
     axis_angle as axis_angle,
     joint_coordinate as joint_coordinate,
     material_angle as material_angle,
     place_along_beam as place_along_beam,
 )
-from paraflex.dynamics.linearise import Vibration as Vibration, natural_frequencies as natural_frequencies
-from paraflex.dynamics.modal_truncation import (
-    MissingRotation as MissingRotation,
-    missing_rotations as missing_rotations,
-)
-from paraflex.dynamics.numbers import numbers_of as numbers_of, same_layout as same_layout, with_numbers as with_numbers
-from paraflex.dynamics.packing import records as records
-from paraflex.dynamics.points import across_chord as across_chord
-from paraflex.dynamics.quasi_static import (
-    JointMotion as JointMotion,
-    balanced_state as balanced_state,
-    joint_motions as joint_motions,
-)
-from paraflex.dynamics.rank import Dependence as Dependence, dependence as dependence, redundant_rows as redundant_rows
-from paraflex.dynamics.sensors import (
-    SensorRows as SensorRows,
-    sensor_readings as sensor_readings,
-    sensor_rows as sensor_rows,
-)
-from paraflex.dynamics.signals import (
+from .linearise import Vibration as Vibration, natural_frequencies as natural_frequencies
+from .modal_truncation import MissingRotation as MissingRotation, missing_rotations as missing_rotations
+from .numbers import numbers_of as numbers_of, same_layout as same_layout, with_numbers as with_numbers
+from .packing import records as records
+from .points import across_chord as across_chord
+from .quasi_static import JointMotion as JointMotion, balanced_state as balanced_state, joint_motions as joint_motions
+from .rank import Dependence as Dependence, dependence as dependence, redundant_rows as redundant_rows
+from .sensors import SensorRows as SensorRows, sensor_readings as sensor_readings, sensor_rows as sensor_rows
+from .signals import (
     InputSignals as InputSignals,
     acting_loads as acting_loads,
     constant_signals as constant_signals,
@@ -46,20 +35,16 @@ from paraflex.dynamics.signals import (
     profile_signal as profile_signal,
     still_signals as still_signals,
 )
-from paraflex.dynamics.singularity import SingularityMeasure as SingularityMeasure
-from paraflex.dynamics.soundness import (
+from .singularity import SingularityMeasure as SingularityMeasure
+from .soundness import (
     Closure as Closure,
     Mobility as Mobility,
     Redundancy as Redundancy,
     closure_of as closure_of,
     mobility as mobility,
 )
-from paraflex.dynamics.start import (
-    pose_at_rest as pose_at_rest,
-    standing_system as standing_system,
-    start_state as start_state,
-)
-from paraflex.dynamics.state import (
+from .start import pose_at_rest as pose_at_rest, standing_system as standing_system, start_state as start_state
+from .state import (
     State as State,
     assembled_position as assembled_position,
     consistent_state as consistent_state,
@@ -70,4 +55,4 @@ from paraflex.dynamics.state import (
     undeformed as undeformed,
     undeformed_motion as undeformed_motion,
 )
-from paraflex.dynamics.system import System as System, build_system as build_system
+from .system import System as System, build_system as build_system

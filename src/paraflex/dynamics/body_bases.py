@@ -11,13 +11,13 @@ import numpy as np
 import scipy.linalg
 
 from paraflex.arrays import Numbers
-from paraflex.dynamics.constraints import Constraint
-from paraflex.dynamics.coordinates import BodyCoordinates, Marker, PlacedBodies
-from paraflex.dynamics.held import held_modes, place_rows, slope_rows, static_shapes
 from paraflex.errors import InputError
 from paraflex.fem import ModalBasis, modal_basis
 from paraflex.kernel.packed import ANGLE, POINT
 from paraflex.mechanism import AppliedTorque, Body, ComponentModes, FlexibleBeam, Mechanism, PointRef, RigidBody
+from .constraints import Constraint
+from .coordinates import BodyCoordinates, Marker, PlacedBodies
+from .held import held_modes, place_rows, slope_rows, static_shapes
 
 # A shape is dropped if its part independent of the others is below this fraction, by the root of its strain energy.
 _DEPENDENT = 1e-10

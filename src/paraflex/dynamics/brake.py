@@ -4,14 +4,14 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from paraflex.arrays import Array
-from paraflex.dynamics.following import driven_rows
-from paraflex.dynamics.joint_coordinates import joint_value
-from paraflex.dynamics.signals import moment_signals
-from paraflex.dynamics.sparse import sparse_mass
-from paraflex.dynamics.state import State, project_velocity
-from paraflex.dynamics.system import System, build_system
 from paraflex.mechanism import PrescribedAngle
 from paraflex.mechanism.profiles import HeldAngle
+from .following import driven_rows
+from .joint_coordinates import joint_value
+from .signals import moment_signals
+from .sparse import sparse_mass
+from .state import State, project_velocity
+from .system import System, build_system
 
 
 @dataclass(frozen=True)

@@ -6,12 +6,12 @@ import numpy as np
 import scipy
 
 from paraflex.arrays import Array
-from paraflex.dynamics.following import driven_rows, drives_at
-from paraflex.dynamics.projection import NAMED, second_rates
-from paraflex.dynamics.rank import DENSE_ROWS, Dependence, dependence
-from paraflex.dynamics.system import System
 from paraflex.kernel.packed import Signals
 from paraflex.mechanism.profiles import ConstantSpeed, HeldAngle
+from .following import driven_rows, drives_at
+from .projection import NAMED, second_rates
+from .rank import DENSE_ROWS, Dependence, dependence
+from .system import System
 
 # Curvatures and rates below this fraction of the largest are rounding.
 _ROUNDING = 1e-7

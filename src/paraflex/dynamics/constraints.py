@@ -7,9 +7,9 @@ from typing import Any, NamedTuple
 import numpy as np
 import scipy
 
-from paraflex.dynamics.inputs import inputs_of
 from paraflex.kernel.packed import ANGLE, AXIS, CONSTRAINT, DAMPER, FRICTION, POINT, SPRING
 from paraflex.mechanism import Joint, Mechanism, PointRef, Relation
+from .inputs import inputs_of
 
 
 @dataclass(frozen=True)

@@ -18,12 +18,12 @@ from typing import NamedTuple
 import numpy as np
 
 from paraflex.arrays import Array, Indices
-from paraflex.dynamics.coordinates import BodyCoordinates, element_at, transverse_pieces, transverse_rows
-from paraflex.dynamics.inertia_moments import inertia_moments
-from paraflex.dynamics.joint_coordinates import place_along_beam
-from paraflex.dynamics.system import System
 from paraflex.fem import ReferenceCondition
 from paraflex.mechanism import FlexibleBeam, Joint, Mechanism
+from .coordinates import BodyCoordinates, element_at, transverse_pieces, transverse_rows
+from .inertia_moments import inertia_moments
+from .joint_coordinates import place_along_beam
+from .system import System
 
 # Two points integrate the cubic, an arm times an acceleration, exactly.
 _POINTS, _WEIGHTS = np.polynomial.legendre.leggauss(2)

@@ -6,19 +6,11 @@ from functools import cached_property
 import numpy as np
 
 from paraflex.arrays import Array, Indices, Numbers
-from paraflex.dynamics.shapes import BodyShape, PointShape, beam_lumps, body_shape
 from paraflex.errors import InputError
-from paraflex.fem import (
-    BeamMesh,
-    MassPoints,
-    ModalBasis,
-    ShapeIntegrals,
-    mass_points,
-    modal_basis,
-    node_weights,
-)
+from paraflex.fem import BeamMesh, MassPoints, ModalBasis, ShapeIntegrals, mass_points, modal_basis, node_weights
 from paraflex.fem.eigen import is_definite
 from paraflex.mechanism import Body, FlexibleBeam, Geometry, Mechanism, PointRef, RigidBody
+from .shapes import BodyShape, PointShape, beam_lumps, body_shape
 
 GROUND_INDEX = -1
 # Eigenvalues of a body's mass matrix, scaled to a unit diagonal, below this are rounding.

@@ -27,9 +27,9 @@ from collections.abc import Iterator
 import numpy as np
 
 from paraflex.arrays import Array, Numbers
-from paraflex.dynamics.coordinates import Marker, PlacedBodies
-from paraflex.dynamics.held import held_modes, place_rows, slope_rows
 from paraflex.mechanism import GROUND, RigidBody, stiffness_proportional
+from .coordinates import Marker, PlacedBodies
+from .held import held_modes, place_rows, slope_rows
 
 # An entry of the damping matrix below this fraction of the damping of its two modes is rounding.
 _ROUNDED_ENTRY = 1e-9

@@ -7,10 +7,10 @@ from itertools import combinations
 import numpy as np
 
 from paraflex.arrays import Array
-from paraflex.dynamics.joint_coordinates import joint_rows
-from paraflex.dynamics.sparse import Saddle, sparse_jacobian, sparse_mass
-from paraflex.dynamics.state import State
-from paraflex.dynamics.system import System
+from .joint_coordinates import joint_rows
+from .sparse import Saddle, sparse_jacobian, sparse_mass
+from .state import State
+from .system import System
 
 # Smallest effect of motors in any direction, squared, as a fraction of the largest: as in `actuation.allocation`.
 _WEAK = 1e-12

@@ -7,13 +7,13 @@ import scipy
 
 from paraflex.arguments import checked_arguments
 from paraflex.arrays import Array
-from paraflex.dynamics.joint_coordinates import joint_coordinate
-from paraflex.dynamics.sparse import sparse_jacobian, stiffness_diagonal
-from paraflex.dynamics.state import State
-from paraflex.dynamics.stiffness import RestingForces, pose_stiffness
-from paraflex.dynamics.system import System
 from paraflex.errors import AssemblyError, Moment
 from paraflex.limits import solvable
+from .joint_coordinates import joint_coordinate
+from .sparse import sparse_jacobian, stiffness_diagonal
+from .state import State
+from .stiffness import RestingForces, pose_stiffness
+from .system import System
 
 _MAX_ITERATIONS = 50
 # Newton's iteration has converged when it moves links by less than this [sizes of the mechanism, rad] ...

@@ -7,14 +7,14 @@ from functools import partial
 import numpy as np
 
 from paraflex.arrays import Array
-from paraflex.dynamics.inputs import inputs_of
-from paraflex.dynamics.joint_coordinates import value_text
-from paraflex.dynamics.projection import assemble, closed, constraint_change
-from paraflex.dynamics.rank import DENSE_ROWS
-from paraflex.dynamics.system import System
 from paraflex.errors import AssemblyError, Moment
 from paraflex.kernel.packed import Signals
 from paraflex.mechanism import PrescribedAngle
+from .inputs import inputs_of
+from .joint_coordinates import value_text
+from .projection import assemble, closed, constraint_change
+from .rank import DENSE_ROWS
+from .system import System
 
 # Weight of stiffness in `link_metric` when loops are closed: links move, their deflections stay as given.
 POSITION_STIFFNESS = 1e6

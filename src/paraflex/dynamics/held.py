@@ -6,8 +6,8 @@ import numpy as np
 import scipy.linalg
 
 from paraflex.arrays import Array, Numbers
-from paraflex.dynamics.coordinates import BodyCoordinates, Marker
 from paraflex.fem.eigen import eigenpairs
+from .coordinates import BodyCoordinates, Marker
 
 # Conditions with an independent part smaller than this fraction are redundant.
 _DEPENDENT = 1e-9

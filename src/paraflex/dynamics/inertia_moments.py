@@ -18,9 +18,9 @@ of Structural Dynamics, 2nd ed., 11.4.
 import numpy as np
 
 from paraflex.arrays import Array
-from paraflex.dynamics.coordinates import BodyCoordinates, transverse_pieces, transverse_rows
 from paraflex.fem import ReferenceCondition
 from paraflex.mechanism import FlexibleBeam
+from .coordinates import BodyCoordinates, transverse_pieces, transverse_rows
 
 
 def inertia_moments(beam: FlexibleBeam, body: BodyCoordinates) -> Array:

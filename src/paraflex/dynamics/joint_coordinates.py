@@ -6,10 +6,10 @@ from typing import NamedTuple
 import numpy as np
 
 from paraflex.arrays import Array
-from paraflex.dynamics.coordinates import GROUND_INDEX, Marker
-from paraflex.dynamics.points import cross, marker_place, marker_position
-from paraflex.dynamics.system import System
 from paraflex.mechanism import Joint, PointRef
+from .coordinates import GROUND_INDEX, Marker
+from .points import cross, marker_place, marker_position
+from .system import System
 
 
 class JointCoordinate(NamedTuple):

@@ -11,15 +11,15 @@ from typing import NamedTuple
 import numpy as np
 
 from paraflex.arrays import Array, Indices, Numbers
-from paraflex.dynamics.constraints import RowTerm, Term
-from paraflex.dynamics.coordinates import transverse_pieces, transverse_rows
-from paraflex.dynamics.following import driven_rows
-from paraflex.dynamics.joint_coordinates import axis_angle, line_direction, unit_vectors
-from paraflex.dynamics.points import cross, marker_place, point_motion
-from paraflex.dynamics.rank import NO_PART, dependence
-from paraflex.dynamics.system import System
 from paraflex.kernel.packed import ANGLE, POINT
 from paraflex.mechanism import Joint
+from .constraints import RowTerm, Term
+from .coordinates import transverse_pieces, transverse_rows
+from .following import driven_rows
+from .joint_coordinates import axis_angle, line_direction, unit_vectors
+from .points import cross, marker_place, point_motion
+from .rank import NO_PART, dependence
+from .system import System
 
 
 class Loads(NamedTuple):

@@ -16,12 +16,12 @@ import scipy
 
 from paraflex.arguments import checked_arguments
 from paraflex.arrays import Array
-from paraflex.dynamics.rank import dependence
-from paraflex.dynamics.sparse import Saddle, sparse_jacobian, sparse_joint_rows, sparse_mass, stiffness_diagonal
-from paraflex.dynamics.state import State
-from paraflex.dynamics.stiffness import RestingForces, pose_stiffness
-from paraflex.dynamics.system import System
 from paraflex.limits import solvable
+from .rank import dependence
+from .sparse import Saddle, sparse_jacobian, sparse_joint_rows, sparse_mass, stiffness_diagonal
+from .state import State
+from .stiffness import RestingForces, pose_stiffness
+from .system import System
 
 if TYPE_CHECKING:
     from scipy.sparse import csr_matrix as Sparse

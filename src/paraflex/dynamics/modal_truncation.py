@@ -11,9 +11,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from paraflex.dynamics.coordinates import BodyCoordinates, PlacedBodies
-from paraflex.dynamics.system import System
 from paraflex.mechanism import AppliedTorque, Mechanism, PointRef, grouped, joints_named
+from .coordinates import BodyCoordinates, PlacedBodies
+from .system import System
 
 # Missing fractions of a rotation below this are not reported.
 _MISSED = 0.05

@@ -7,10 +7,6 @@ from typing import Any
 import numpy as np
 
 from paraflex.arrays import Array, Records
-from paraflex.dynamics.constraints import Constraint, Term, coordinate
-from paraflex.dynamics.coordinates import BodyCoordinates, Marker, PlacedBodies, transverse_pieces
-from paraflex.dynamics.inputs import inputs_of
-from paraflex.dynamics.scale import mechanism_size
 from paraflex.kernel.packed import (
     ANGLE,
     AXIS,
@@ -29,6 +25,10 @@ from paraflex.kernel.packed import (
 from paraflex.kernel.sums import FIRST_MARKER
 from paraflex.kernel.vectors import padded
 from paraflex.mechanism import Joint, Mechanism, PointRef, TimeProfile
+from .constraints import Constraint, Term, coordinate
+from .coordinates import BodyCoordinates, Marker, PlacedBodies, transverse_pieces
+from .inputs import inputs_of
+from .scale import mechanism_size
 
 # Fields of a line that a spring between points defines.
 _OF_SPRINGS = ("stiffness", "length", "damping")

@@ -5,9 +5,9 @@ from typing import NamedTuple
 import numpy as np
 
 from paraflex.arrays import Array
-from paraflex.dynamics.coordinates import GROUND_INDEX, Marker
-from paraflex.dynamics.system import System
 from paraflex.mechanism import PointRef
+from .coordinates import GROUND_INDEX, Marker
+from .system import System
 
 
 class PointMotion(NamedTuple):

@@ -10,13 +10,13 @@ import numpy as np
 import scipy
 
 from paraflex.arrays import Array, Mask
-from paraflex.dynamics.inputs import inputs_of
-from paraflex.dynamics.rank import DENSE_ROWS, Dependence, constraint_jacobian, dependence, involved, joint_of_row
-from paraflex.dynamics.sparse import Saddle, elastic_stiffness, sparse_mass
-from paraflex.dynamics.system import System
 from paraflex.errors import InconsistentConstraintsError, Moment
 from paraflex.kernel.packed import INDEX_1, Signals
 from paraflex.kernel.stage import equations
+from .inputs import inputs_of
+from .rank import DENSE_ROWS, Dependence, constraint_jacobian, dependence, involved, joint_of_row
+from .sparse import Saddle, elastic_stiffness, sparse_mass
+from .system import System
 
 Sparse = scipy.sparse.csr_matrix
 # Function from the wanted rows (m,) to the smallest change.

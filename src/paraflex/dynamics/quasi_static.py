@@ -8,15 +8,15 @@ from typing import NamedTuple
 import numpy as np
 
 from paraflex.arrays import Array
-from paraflex.dynamics.equilibrium import largest_move, moving_equilibrium, static_equilibrium
-from paraflex.dynamics.joint_coordinates import joint_coordinate, joint_value
-from paraflex.dynamics.projection import LeastChange, constraint_change, project, second_rates
-from paraflex.dynamics.rank import dependence
-from paraflex.dynamics.signals import moment_signals
-from paraflex.dynamics.state import VELOCITY_STIFFNESS, State
-from paraflex.dynamics.system import System, build_system
 from paraflex.mechanism import Load, PrescribedAngle, TimeProfile
 from paraflex.mechanism.profiles import HeldAngle, SampledAngle
+from .equilibrium import largest_move, moving_equilibrium, static_equilibrium
+from .joint_coordinates import joint_coordinate, joint_value
+from .projection import LeastChange, constraint_change, project, second_rates
+from .rank import dependence
+from .signals import moment_signals
+from .state import VELOCITY_STIFFNESS, State
+from .system import System, build_system
 
 # Motion of the mechanism for a central difference [sizes of the mechanism, rad].
 _DIFFERENCE_MOVE = 1e-3

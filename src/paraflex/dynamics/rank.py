@@ -6,9 +6,9 @@ import numpy as np
 import scipy
 
 from paraflex.arrays import Array, Indices
-from paraflex.dynamics.sparse import body_masses, sparse_jacobian
-from paraflex.dynamics.system import System
 from paraflex.kernel.linear import factor_system
+from .sparse import body_masses, sparse_jacobian
+from .system import System
 
 # A constraint row with an independent part smaller than this fraction of the largest is redundant.
 DEPENDENT = 1e-9

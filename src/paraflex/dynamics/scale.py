@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 
-from paraflex.dynamics.coordinates import BodyCoordinates
+from .coordinates import BodyCoordinates
 
 
 def mechanism_size(bodies: tuple[BodyCoordinates, ...]) -> float:

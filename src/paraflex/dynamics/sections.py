@@ -24,13 +24,13 @@ from typing import NamedTuple
 import numpy as np
 
 from paraflex.arrays import Array
-from paraflex.dynamics.contacts import Contacts, contacts_of
-from paraflex.dynamics.coordinates import BodyCoordinates, piece_rows
-from paraflex.dynamics.inertia_moments import inertia_moments
-from paraflex.dynamics.system import System
 from paraflex.fem.integrals import GAUSS_PLACES, GAUSS_WEIGHTS
 from paraflex.mechanism import AssumedModesBeam, FlexibleBeam, Material, Section
 from paraflex.mechanism.bodies import per_span
+from .contacts import Contacts, contacts_of
+from .coordinates import BodyCoordinates, piece_rows
+from .inertia_moments import inertia_moments
+from .system import System
 
 # Fewest pieces between stations: per beam, and per element. Under a uniform load the largest moment between two
 # stations exceeds that at the stations by at most 1/256 of itself.

@@ -13,15 +13,15 @@ import numpy as np
 import scipy
 
 from paraflex.arrays import Array, Numbers
-from paraflex.dynamics.contacts import sliding_joints
-from paraflex.dynamics.joint_coordinates import axis_angle, joint_coordinate, line_direction, unit_vectors
-from paraflex.dynamics.joint_loads import JointParts, joint_parts, load_in
-from paraflex.dynamics.points import marker_position, point_motion
-from paraflex.dynamics.sections import section_at
-from paraflex.dynamics.system import System
 from paraflex.errors import InputError
 from paraflex.mechanism import GROUND, AssumedModesBeam, FlexibleBeam, Mechanism, PointRef, Sensor
 from paraflex.mechanism.checks import check_sensor
+from .contacts import sliding_joints
+from .joint_coordinates import axis_angle, joint_coordinate, line_direction, unit_vectors
+from .joint_loads import JointParts, joint_parts, load_in
+from .points import marker_position, point_motion
+from .sections import section_at
+from .system import System
 
 _STEP = 1e-30
 

@@ -7,10 +7,10 @@ from typing import NamedTuple
 import numpy as np
 
 from paraflex.arrays import Array
-from paraflex.dynamics.inputs import inputs_of
 from paraflex.errors import InputError, within
 from paraflex.kernel.packed import PackedSystem, Signals
 from paraflex.mechanism import Mechanism, TabulatedProfile, TimeProfile
+from .inputs import inputs_of
 
 # Initial number of quintic Hermite pieces of a prescribed motion per run, and largest numbers of pieces and halvings.
 # Pieces are halved until their midpoints are within _NEAR_PROFILE of it, relative to its largest value, or within

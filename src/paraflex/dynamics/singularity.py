@@ -6,8 +6,8 @@ from functools import cached_property
 import numpy as np
 
 from paraflex.arrays import Array, Indices, Numbers
-from paraflex.dynamics.joint_coordinates import joint_rows
-from paraflex.dynamics.system import System
+from .joint_coordinates import joint_rows
+from .system import System
 
 # Rows with a smaller singular value than this are redundant at all poses; closure errors are far smaller.
 _DEPENDENT = 1e-6

@@ -7,15 +7,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from paraflex.arrays import Array
-from paraflex.dynamics.projection import joint_gaps
-from paraflex.dynamics.rank import Dependence, dependence, involved, joint_of_row
-from paraflex.dynamics.signals import moment_signals
-from paraflex.dynamics.sparse import Saddle, sparse_jacobian, sparse_mass
-from paraflex.dynamics.state import State, consistent_state, minimise_gaps, reference_pose
-from paraflex.dynamics.system import System
 from paraflex.errors import AssemblyError, InconsistentConstraintsError, ProportionError
 from paraflex.limits import solvable
 from paraflex.mechanism import Assembly
+from .projection import joint_gaps
+from .rank import Dependence, dependence, involved, joint_of_row
+from .signals import moment_signals
+from .sparse import Saddle, sparse_jacobian, sparse_mass
+from .state import State, consistent_state, minimise_gaps, reference_pose
+from .system import System
 
 # Rotation of a body, or displacement relative to the mechanism's size, of the poses that test for a special pose.
 _NUDGE = 1e-2

@@ -10,13 +10,13 @@ import numpy as np
 import scipy
 
 from paraflex.arrays import Array, Indices, Numbers
-from paraflex.dynamics.joint_coordinates import joint_coordinate
-from paraflex.dynamics.signals import no_signals
-from paraflex.dynamics.system import System
 from paraflex.kernel.bodies import motion_forces
 from paraflex.kernel.constraints import constraint_values
 from paraflex.kernel.packed import OMEGA2, PackedSystem, make_scratch
 from paraflex.mechanism import is_hinge
+from .joint_coordinates import joint_coordinate
+from .signals import no_signals
+from .system import System
 
 # Diagonal element in place of zero, as a fraction of entries of size one, so that a factor exists with dependent rows;
 # iterative refinement removes its effect.

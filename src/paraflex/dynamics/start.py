@@ -9,23 +9,6 @@ import scipy
 
 from paraflex.arguments import checked_arguments
 from paraflex.arrays import Array, Mask
-from paraflex.dynamics.change_points import change_point_at
-from paraflex.dynamics.coordinates import BodyCoordinates, end_markers
-from paraflex.dynamics.following import POSITION_STIFFNESS, follow_drives
-from paraflex.dynamics.joint_coordinates import joint_value
-from paraflex.dynamics.points import marker_place
-from paraflex.dynamics.projection import assemble, constraint_change, least_change, link_metric, project
-from paraflex.dynamics.rank import constraint_jacobian
-from paraflex.dynamics.signals import moment_signals
-from paraflex.dynamics.state import (
-    VELOCITY_STIFFNESS,
-    State,
-    check_accelerations,
-    consistent_state,
-    reference_pose,
-    undeformed,
-)
-from paraflex.dynamics.system import System, build_system
 from paraflex.errors import InconsistentConstraintsError, InputError
 from paraflex.kernel.packed import Signals
 from paraflex.limits import solvable
@@ -40,6 +23,16 @@ from paraflex.mechanism import (
     check_start,
     standing,
 )
+from .change_points import change_point_at
+from .coordinates import BodyCoordinates, end_markers
+from .following import POSITION_STIFFNESS, follow_drives
+from .joint_coordinates import joint_value
+from .points import marker_place
+from .projection import assemble, constraint_change, least_change, link_metric, project
+from .rank import constraint_jacobian
+from .signals import moment_signals
+from .state import VELOCITY_STIFFNESS, State, check_accelerations, consistent_state, reference_pose, undeformed
+from .system import System, build_system
 
 # Largest gap of joints at a given start [sizes of the mechanism, rad], and largest relative error of velocities.
 _GAP = 1e-6

@@ -10,26 +10,17 @@ import scipy
 
 from paraflex.arguments import checked_arguments, named_in_errors
 from paraflex.arrays import Array
-from paraflex.dynamics.change_points import branches_from_rest, change_point_at
-from paraflex.dynamics.following import POSITION_STIFFNESS, follow_drives
-from paraflex.dynamics.points import marker_position
-from paraflex.dynamics.projection import (
-    assemble,
-    closed,
-    constraint_change,
-    gap_texts,
-    project,
-    refuse_conflict,
-    second_rates,
-)
-from paraflex.dynamics.signals import moment_signals
-from paraflex.dynamics.sparse import body_masses, sparse_mass
-from paraflex.dynamics.system import System, build_system
 from paraflex.errors import AssemblyError, InconsistentConstraintsError, Moment
 from paraflex.kernel.packed import Signals
 from paraflex.limits import solvable
-from paraflex.mechanism import GROUND, Assembly, PointRef
-from paraflex.mechanism.poses import approximate_poses
+from paraflex.mechanism import GROUND, Assembly, PointRef, approximate_poses
+from .change_points import branches_from_rest, change_point_at
+from .following import POSITION_STIFFNESS, follow_drives
+from .points import marker_position
+from .projection import assemble, closed, constraint_change, gap_texts, project, refuse_conflict, second_rates
+from .signals import moment_signals
+from .sparse import body_masses, sparse_mass
+from .system import System, build_system
 
 # If Newton's iteration fails, a damped one finds the smallest gap: its iterations, dampings and least gain.
 _MAX_DESCENT, _FIRST_DAMPING, _LARGEST_DAMPING, _NO_GAIN = 200, 1e-2, 1e6, 1e-9

@@ -6,13 +6,13 @@ import numpy as np
 import scipy
 
 from paraflex.arrays import Array, Indices
-from paraflex.dynamics.inputs import inputs_of
-from paraflex.dynamics.signals import moment_signals
-from paraflex.dynamics.sparse import without_stiffness
-from paraflex.dynamics.system import System
-from paraflex.dynamics.tangents import MotionPoint, Tangency
 from paraflex.kernel.packed import CONSTRAINT, FRICTION, INDEX_1, SPRING, PackedSystem, Signals, Workspace
 from paraflex.kernel.stage import equations
+from .inputs import inputs_of
+from .signals import moment_signals
+from .sparse import without_stiffness
+from .system import System
+from .tangents import MotionPoint, Tangency
 
 
 class RestingForces:

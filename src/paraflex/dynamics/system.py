@@ -10,15 +10,15 @@ import scipy
 
 from paraflex.arguments import checked_arguments, named_in_errors
 from paraflex.arrays import Array, Mask
-from paraflex.dynamics.body_bases import is_reduced, reduced_body
-from paraflex.dynamics.constraints import RowTerm, row_order, terms_by_joint
-from paraflex.dynamics.coordinates import BodyCoordinates, Marker, PlacedBodies, body_coordinates
-from paraflex.dynamics.damping import damping_matrix
-from paraflex.dynamics.packing import pack_system
 from paraflex.kernel.constraints import constraint_values, fill_jacobian
 from paraflex.kernel.packed import CONSTRAINT, PackedSystem, Signals, Workspace, make_scratch, make_workspace
 from paraflex.limits import solvable
 from paraflex.mechanism import Mechanism, PointRef, in_frames, rotor_mass, with_actuators
+from .body_bases import is_reduced, reduced_body
+from .constraints import RowTerm, row_order, terms_by_joint
+from .coordinates import BodyCoordinates, Marker, PlacedBodies, body_coordinates
+from .damping import damping_matrix
+from .packing import pack_system
 
 # Damping ratio below which a vibration counts as undamped: it loses 1.2 % of its amplitude in a period.
 _HARDLY_DAMPED = 2e-3

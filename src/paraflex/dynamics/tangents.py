@@ -20,12 +20,12 @@ import scipy
 from scipy.sparse import csr_matrix
 
 from paraflex.arrays import Array, Indices
-from paraflex.dynamics.inputs import inputs_of
-from paraflex.dynamics.sparse import apart_colours, bodies_acted_on, tied_bodies
-from paraflex.dynamics.system import System
 from paraflex.kernel.packed import FRICTION, INDEX_1, SPRING
 from paraflex.kernel.tangent import make_tangent, note_slopes
 from paraflex.kernel.tangent_columns import ACCELERATION, COORDINATE, VELOCITY, tangent_columns
+from .inputs import inputs_of
+from .sparse import apart_colours, bodies_acted_on, tied_bodies
+from .system import System
 
 # Weights of Phi'', Phi' and Phi for rows equal to Phi'.
 _RATES = (0.0, 1.0, 0.0)

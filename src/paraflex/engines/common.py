@@ -7,10 +7,10 @@ from typing import Any, NoReturn
 import numpy as np
 
 from paraflex.arrays import Array
-from paraflex.engines.tree import spanning_tree
 from paraflex.errors import InputError, optional_package
 from paraflex.mechanism import FlexibleBeam, Mechanism, given_shapes, grouped, with_actuators
 from paraflex.tracking import TrackingTask
+from .tree import spanning_tree
 
 # Package names of the engines, by which users refer to them, and their names in messages.
 _ENGINE_NAMES = {"exudyn": "Exudyn", "mujoco": "MuJoCo"}

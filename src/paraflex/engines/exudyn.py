@@ -16,8 +16,6 @@ import numpy as np
 from paraflex.actuation import FeedForward, actuation_condition
 from paraflex.arrays import Array, Indices
 from paraflex.dynamics import System
-from paraflex.engines.cables import Cable, Columns, Ground, Link, Linkage, RigidLink, RigidState, Trajectory
-from paraflex.engines.common import check_dwell, check_engine, import_engine, steps_between, with_rotors
 from paraflex.errors import InputError, IntegrationError, Moment
 from paraflex.interrupts import uninterrupted
 from paraflex.mechanism import ActuationMode, Body, FlexibleBeam, Joint, Mechanism, PointRef, TorsionalSpring
@@ -27,6 +25,8 @@ from paraflex.results.numbers import single
 from paraflex.results.outlines import chord_deflections, outlines
 from paraflex.results.record import Record
 from paraflex.tracking import TrackingTask
+from .cables import Cable, Columns, Ground, Link, Linkage, RigidLink, RigidState, Trajectory
+from .common import check_dwell, check_engine, import_engine, steps_between, with_rotors
 
 # Newton's residual, a norm over all coordinates, is zero to rounding at this multiple of an internal force's rounding.
 _FLOOR = 100.0

@@ -17,8 +17,6 @@ import numpy as np
 from paraflex.actuation import FeedForward, actuation_condition
 from paraflex.arrays import Array
 from paraflex.dynamics import System, still_signals
-from paraflex.engines.common import check_dwell, check_engine, import_engine, steps_between
-from paraflex.engines.tree import Tree, body_motion, joint_state, spanning_tree
 from paraflex.errors import IntegrationError, Moment
 from paraflex.integrators import Solution
 from paraflex.kernel.bodies import weight_work
@@ -26,6 +24,8 @@ from paraflex.kernel.packed import make_scratch
 from paraflex.mechanism import GROUND, ActuationMode, Joint, Mechanism, Relation, proportional_segments
 from paraflex.results.record import Record, record
 from paraflex.tracking import TrackingRun, TrackingTask
+from .common import check_dwell, check_engine, import_engine, steps_between
+from .tree import Tree, body_motion, joint_state, spanning_tree
 
 # Weights of the RK4 stages, for the work of the motors.
 _RK4 = (1.0 / 6.0, 1.0 / 3.0, 1.0 / 3.0, 1.0 / 6.0)

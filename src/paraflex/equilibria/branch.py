@@ -16,8 +16,8 @@ from scipy.sparse import csr_matrix
 
 from paraflex.arrays import Array
 from paraflex.dynamics.sparse import solved
-from paraflex.equilibria.equations import Equations, Unknowns
 from paraflex.errors import EquilibriumError, LimitPointError
+from .equations import Equations, Unknowns
 
 _MOST_ITERATIONS = 25
 # Newton's iteration of a step has converged when it moves less than the first [sizes of the mechanism, rad], or less

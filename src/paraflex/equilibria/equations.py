@@ -21,16 +21,15 @@ import scipy
 from scipy.sparse import csr_matrix
 
 from paraflex.arrays import Array, Indices
-from paraflex.dynamics import State, System
+from paraflex.dynamics import State, System, acting_loads
 from paraflex.dynamics.constraints import coordinate_kind
-from paraflex.dynamics.signals import acting_loads
 from paraflex.dynamics.sparse import Saddle, stiffness_diagonal, without_stiffness
 from paraflex.dynamics.stiffness import RestingForces
 from paraflex.dynamics.tangents import MotionPoint, Tangency
-from paraflex.equilibria.conditions import Conditions, Coordinate
 from paraflex.linear.coordinates import Coordinates, unit_in, with_coordinates
 from paraflex.linear.independent import independent_dense, independent_sparse
 from paraflex.mechanism import PointRef
+from .conditions import Conditions, Coordinate
 
 # Up to this number of entries a QR factorisation finds the independent rows of a matrix, beyond it elimination.
 _DENSE_ENTRIES = 400_000

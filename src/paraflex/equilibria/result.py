@@ -13,16 +13,16 @@ from paraflex.dynamics import System
 from paraflex.dynamics.points import point_motion
 from paraflex.dynamics.rank import NO_PART, Dependence, dependence
 from paraflex.dynamics.sparse import stiffness_diagonal
-from paraflex.equilibria.branch import Point
-from paraflex.equilibria.conditions import Coordinate
-from paraflex.equilibria.equations import Equations
-from paraflex.equilibria.stability import Buckling, Vibrations
 from paraflex.errors import InputError, suggestion
 from paraflex.findings import Finding
 from paraflex.integrators import Solution
 from paraflex.kernel.packed import SPRING
 from paraflex.mechanism.quantities import known
 from paraflex.validity import Validity, assess, implausible_stresses, shared_loads
+from .branch import Point
+from .conditions import Coordinate
+from .equations import Equations
+from .stability import Buckling, Vibrations
 
 
 @dataclass(frozen=True)

@@ -1,7 +1,5 @@
 """Properties of an equilibrium: stability, natural frequencies, buckling, stiffness in named directions."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import NamedTuple
 
@@ -12,9 +10,9 @@ from scipy.sparse import csr_matrix
 from paraflex.arrays import Array
 from paraflex.dynamics.linearise import DENSE_COORDINATES, LOWEST, admissible, all_modes, slowest, typical_square
 from paraflex.dynamics.sparse import Saddle, solved
-from paraflex.equilibria.branch import Point
-from paraflex.equilibria.conditions import Coordinate
-from paraflex.equilibria.equations import Equations, Matrices, Unknowns
+from .branch import Point
+from .conditions import Coordinate
+from .equations import Equations, Matrices, Unknowns
 
 # Step of finite differences along the branch: motion of links [sizes of the mechanism, rad] and change of fraction.
 _MOVE, _FRACTION = 1e-4, 1e-2

@@ -8,16 +8,16 @@ from scipy.sparse import csr_matrix
 
 from paraflex.arguments import checked_arguments
 from paraflex.dynamics import State, pose_at_rest, standing_system
-from paraflex.equilibria.branch import Branch, Point
-from paraflex.equilibria.conditions import ModelWithStatics, StaticsDefaults, conditions
-from paraflex.equilibria.equations import Equations
-from paraflex.equilibria.result import Equilibrium, Statics
-from paraflex.equilibria.stability import buckling as buckling_about, checked, stiffness as stiffness_at, vibrations
 from paraflex.errors import EquilibriumError, ResultWarning
 from paraflex.findings import warn_of
 from paraflex.limits import solvable
 from paraflex.mechanism import Mechanism, Start
 from paraflex.validity import warn
+from .branch import Branch, Point
+from .conditions import ModelWithStatics, StaticsDefaults, conditions
+from .equations import Equations
+from .result import Equilibrium, Statics
+from .stability import buckling as buckling_about, checked, stiffness as stiffness_at, vibrations
 
 # A limit point is searched for if the linear estimate is further away than the first, as the estimate errs by no more
 # than its distance. The search ends at the second load factor, or at the third if estimates change along the branch by

@@ -1,6 +1,6 @@
 """Flexible beams: element, mesh, reference conditions, shape integrals and eigenmodes, independent of mechanisms."""
 
-from paraflex.fem.assumed import (
+from .assumed import (
     AssumedShapes as AssumedShapes,
     PlacedLump as PlacedLump,
     Polynomial as Polynomial,
@@ -8,23 +8,19 @@ from paraflex.fem.assumed import (
     Sine as Sine,
     assumed_integrals as assumed_integrals,
 )
-from paraflex.fem.foreshortening import (
+from .foreshortening import (
     MassPoints as MassPoints,
     mass_points as mass_points,
     node_weights as node_weights,
     slope_square_integrals as slope_square_integrals,
 )
-from paraflex.fem.integrals import (
+from .integrals import (
     Lump as Lump,
     ShapeIntegrals as ShapeIntegrals,
     SpanProperties as SpanProperties,
     beam_integrals as beam_integrals,
     rigid_integrals as rigid_integrals,
 )
-from paraflex.fem.mesh import BeamMesh as BeamMesh, mesh_beam as mesh_beam
-from paraflex.fem.modes import (
-    ModalBasis as ModalBasis,
-    modal_basis as modal_basis,
-    natural_frequencies as natural_frequencies,
-)
-from paraflex.fem.reference import ReferenceCondition as ReferenceCondition, reference_basis as reference_basis
+from .mesh import BeamMesh as BeamMesh, mesh_beam as mesh_beam
+from .modes import ModalBasis as ModalBasis, modal_basis as modal_basis, natural_frequencies as natural_frequencies
+from .reference import ReferenceCondition as ReferenceCondition, reference_basis as reference_basis

@@ -15,7 +15,7 @@ import scipy
 
 from paraflex.arrays import Array, Numbers
 from paraflex.errors import InputError
-from paraflex.fem.integrals import ShapeIntegrals, SpanProperties, bar_integrals
+from .integrals import ShapeIntegrals, SpanProperties, bar_integrals
 
 # Additional Gauss points, so that products of sines are integrated to rounding.
 _EXTRA_GAUSS_POINTS = 16

@@ -11,8 +11,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from paraflex.arrays import Array
-from paraflex.fem.integrals import GAUSS_PLACES, GAUSS_POINTS, GAUSS_WEIGHTS, Lump, SpanProperties
-from paraflex.fem.mesh import BeamMesh
+from .integrals import GAUSS_PLACES, GAUSS_POINTS, GAUSS_WEIGHTS, Lump, SpanProperties
+from .mesh import BeamMesh
 
 
 @dataclass(frozen=True)

@@ -7,8 +7,8 @@ from functools import lru_cache
 import numpy as np
 
 from paraflex.arrays import Array
-from paraflex.fem.mesh import BeamMesh
-from paraflex.fem.reference import ReferenceCondition, reference_basis
+from .mesh import BeamMesh
+from .reference import ReferenceCondition, reference_basis
 
 # N^T N is of degree 10 in x, exact with six Gauss points.
 GAUSS_POINTS = 6

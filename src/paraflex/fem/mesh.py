@@ -7,16 +7,8 @@ import numpy as np
 
 from paraflex.arrays import Array, Indices
 from paraflex.errors import InputError
-from paraflex.fem.element import (
-    AXIAL,
-    COORDINATES_PER_NODE,
-    CURVATURE,
-    SLOPE,
-    TRANSVERSE,
-    axial_shape,
-    transverse_shape,
-)
 from paraflex.limits import ELEMENTS, at_most
+from .element import AXIAL, COORDINATES_PER_NODE, CURVATURE, SLOPE, TRANSVERSE, axial_shape, transverse_shape
 
 # Two points closer than this fraction of the beam are one node: a shorter element is an input error.
 COINCIDENT_POINTS = 1e-9

@@ -6,8 +6,8 @@ import numpy as np
 import scipy
 
 from paraflex.arrays import Array
-from paraflex.fem.eigen import eigenpairs
-from paraflex.fem.integrals import ShapeIntegrals
+from .eigen import eigenpairs
+from .integrals import ShapeIntegrals
 
 
 @dataclass(frozen=True)

@@ -11,9 +11,9 @@ import numpy as np
 
 from paraflex.arrays import Array
 from paraflex.errors import as_enum
-from paraflex.fem.eigen import eigenpairs
-from paraflex.fem.element import AXIAL, CURVATURE, SLOPE, TRANSVERSE
-from paraflex.fem.mesh import BeamMesh
+from .eigen import eigenpairs
+from .element import AXIAL, CURVATURE, SLOPE, TRANSVERSE
+from .mesh import BeamMesh
 
 N_RIGID = 3
 

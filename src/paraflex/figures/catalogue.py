@@ -8,9 +8,9 @@ from functools import cache
 from importlib import import_module
 from typing import Any
 
-from paraflex.figures.charts import Chart, Panel
-from paraflex.figures.entry import ENTRIES, Figure, prepared
 from paraflex.folders.kinds import RESULT_KINDS
+from .charts import Chart, Panel
+from .entry import ENTRIES, Figure, prepared
 
 
 @cache

@@ -10,12 +10,12 @@ import numpy as np
 import xarray as xr
 
 from paraflex.errors import InputError
-from paraflex.figures.charts import TIME, Axis, Chart, Curve, joined, look
-from paraflex.figures.selection import one_run
-from paraflex.figures.tables import Column, Table, in_row_units
 from paraflex.formatting import ROUNDING, display_unit, peak, text_symbol
 from paraflex.results.metrics import metric_label
 from paraflex.units import PERCENT
+from .charts import TIME, Axis, Chart, Curve, joined, look
+from .selection import one_run
+from .tables import Column, Table, in_row_units
 
 if TYPE_CHECKING:
     from paraflex.results.comparison import MotionPair, NumberPair, RunComparison

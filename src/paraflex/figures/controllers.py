@@ -8,14 +8,14 @@ import numpy as np
 import xarray as xr
 
 from paraflex.arrays import Array
-from paraflex.figures.charts import DOTTED, Axis, Chart, Curve, look, stairs
-from paraflex.figures.entry import figure
-from paraflex.figures.loads import run_columns
-from paraflex.figures.runs import after_motion
-from paraflex.figures.tables import Column, Table, columns_of
 from paraflex.formatting import NO_VALUE, ROUNDING, number, quantity, text_symbol
 from paraflex.results.controllers import APPLIED, CONTROLLERS, READINGS, REQUESTED, ControllerData, controllers_of
 from paraflex.units import EFFORTS, DisplayUnit
+from .charts import DOTTED, Axis, Chart, Curve, look, stairs
+from .entry import figure
+from .loads import run_columns
+from .runs import after_motion
+from .tables import Column, Table, columns_of
 
 _WORDS = {"rad": "angle", "m": "position", "rad/s": "rate", "m/s": "speed", **EFFORTS}
 # Internal torques below this share of the largest torque are rounding errors.

@@ -12,13 +12,13 @@ import numpy as np
 from paraflex.arrays import Array, Indices, Mask, NDArray
 from paraflex.campaign import read_tables
 from paraflex.errors import InputError, suggestion
-from paraflex.figures.charts import Axis, Chart, Curve, Mark, is_wide, look, stairs
-from paraflex.figures.entry import figure
-from paraflex.figures.selection import place_of
-from paraflex.figures.tables import Column, Table
 from paraflex.formatting import NO_VALUE, axis_unit, text_symbol
 from paraflex.results.metrics import JOINT, METRICS, MOTOR, metric_label
 from paraflex.seals import damaged
+from .charts import Axis, Chart, Curve, Mark, is_wide, look, stairs
+from .entry import figure
+from .selection import place_of
+from .tables import Column, Table
 
 # Metrics by which designs are not chosen: those of the solver, and those for which smaller is not always better.
 _NOT_JUDGED = tuple(metric.name for metric in METRICS.values() if metric.of_solver or not metric.ranked)

@@ -10,8 +10,8 @@ from typing import Any, Literal
 
 import xarray as xr
 
-from paraflex.figures.charts import Chart
-from paraflex.figures.selection import as_runs, selected
+from .charts import Chart
+from .selection import as_runs, selected
 
 Charts = Callable[..., Iterable[Chart]]
 # Data of a figure: all results; the run of a mode; a mode and a pair of models; the number of a run; a table of

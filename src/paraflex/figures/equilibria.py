@@ -7,13 +7,13 @@ import numpy as np
 import xarray as xr
 
 from paraflex.arrays import Array
-from paraflex.figures.charts import DOTTED, PLAIN_LOOK, Axis, Chart, Curve, Look, look
-from paraflex.figures.entry import figure
-from paraflex.figures.selection import names_of
-from paraflex.figures.shapes import figure_of
-from paraflex.figures.tables import Column, Table
 from paraflex.formatting import ROUNDING, number, peak, text_symbol
 from paraflex.results.statics_steps import NAMED_UNITS, branch_parts, seen_buckling, step_kinds
+from .charts import DOTTED, PLAIN_LOOK, Axis, Chart, Curve, Look, look
+from .entry import figure
+from .selection import names_of
+from .shapes import figure_of
+from .tables import Column, Table
 
 # Largest numbers of frequencies drawn, and of joints or coordinates offered by a chart; statics.nc has all.
 _FREQUENCIES, _MOST_CHOICES = 4, 60

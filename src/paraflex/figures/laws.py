@@ -5,12 +5,12 @@ from collections.abc import Iterator
 import numpy as np
 import xarray as xr
 
-from paraflex.figures.charts import Axis, Chart, Curve, Mark, is_wide, look
-from paraflex.figures.entry import figure
-from paraflex.figures.selection import names_of
-from paraflex.figures.tables import Column, Table
 from paraflex.results.metrics import METRICS, VALIDITY, metric_label
 from paraflex.units import PERCENT
+from .charts import Axis, Chart, Curve, Mark, is_wide, look
+from .entry import figure
+from .selection import names_of
+from .tables import Column, Table
 
 # Metrics shown first; others fill the remaining panels.
 _FIRST = ("tracking_rms_motion", "tracking_rms", "residual_vibration", "peak_torque_max")

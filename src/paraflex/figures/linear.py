@@ -9,10 +9,6 @@ import numpy as np
 import xarray as xr
 
 from paraflex.arrays import Array, Complex
-from paraflex.figures.charts import DASHED, DOTTED, N_COLOURS, PLAIN_LOOK, Axis, Chart, Curve, Look, Span, look
-from paraflex.figures.entry import NOTHING, figure
-from paraflex.figures.selection import names_of, place_of
-from paraflex.figures.tables import Column, Table
 from paraflex.formatting import NO_VALUE, number, text_symbol
 from paraflex.results.linear_summary import (
     END_EFFECTOR,
@@ -33,6 +29,10 @@ from paraflex.results.linear_summary import (
     zeros_of,
 )
 from paraflex.units import DisplayUnit
+from .charts import DASHED, DOTTED, N_COLOURS, PLAIN_LOOK, Axis, Chart, Curve, Look, Span, look
+from .entry import NOTHING, figure
+from .selection import names_of, place_of
+from .tables import Column, Table
 
 # Rows of poles: mode, state of its motors, and poles.
 Row = tuple[str, str, Complex]

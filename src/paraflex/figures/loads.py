@@ -7,15 +7,15 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from paraflex.figures.charts import DOTTED, Axis, Chart, Curve, look
-from paraflex.figures.entry import figure
-from paraflex.figures.runs import followed, of_names, stopped_runs
-from paraflex.figures.selection import names_of
-from paraflex.figures.tables import Cell, Column, Table, columns_of
 from paraflex.formatting import NO_VALUE, common_unit, number, peak, text_symbol
 from paraflex.results.beam_stresses import CONTACT, stresses_of
 from paraflex.results.loads import resolved_error, sliding_joints
 from paraflex.units import EFFORTS
+from .charts import DOTTED, Axis, Chart, Curve, look
+from .entry import figure
+from .runs import followed, of_names, stopped_runs
+from .selection import names_of
+from .tables import Cell, Column, Table, columns_of
 
 # Loads by run: the names of a run, such as its path and mode, and what `results.loads.load_figures` returns.
 LoadsOfRuns = Mapping[tuple[str, ...], Mapping[str, Any]]

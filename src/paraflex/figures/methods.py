@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from paraflex.figures.charts import Axis, Chart, Curve, Look, Mark, Span
-from paraflex.figures.entry import figure
-from paraflex.figures.tables import Column, Table
 from paraflex.formatting import number
+from .charts import Axis, Chart, Curve, Look, Mark, Span
+from .entry import figure
+from .tables import Column, Table
 
 # Dashes and marks of the methods of a family; its members differ in colour.
 _FAMILIES: Mapping[str, tuple[int, Mark]] = {

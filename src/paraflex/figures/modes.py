@@ -5,9 +5,9 @@ from typing import Any
 
 import numpy as np
 
-from paraflex.figures.charts import Axis, Chart, Curve, Look
-from paraflex.figures.entry import figure
-from paraflex.figures.tables import Column, Table
+from .charts import Axis, Chart, Curve, Look
+from .entry import figure
+from .tables import Column, Table
 
 
 @figure("worst condition number of every mode along the path", columns=1,

@@ -5,12 +5,12 @@ from dataclasses import replace
 
 import xarray as xr
 
-from paraflex.figures.charts import Axis, Chart, Curve, look
-from paraflex.figures.entry import figure
-from paraflex.figures.run_motion import ANGLE, ANGLES, RATES, energy_chart, moving_points, points_of
-from paraflex.figures.runs import followed, ranges, stopped_runs
-from paraflex.figures.selection import names_of
 from paraflex.formatting import ROUNDING, peak, text_symbol
+from .charts import Axis, Chart, Curve, look
+from .entry import figure
+from .run_motion import ANGLE, ANGLES, RATES, energy_chart, moving_points, points_of
+from .runs import followed, ranges, stopped_runs
+from .selection import names_of
 
 # Axes of coordinates by the last part of their names.
 _KINDS = {

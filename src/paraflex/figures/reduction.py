@@ -7,16 +7,16 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from paraflex.figures.charts import PLAIN_LOOK, Axis, Chart, Curve, Look, Span, look
-from paraflex.figures.entry import NOTHING, figure
-from paraflex.figures.linear import FREQUENCY
-from paraflex.figures.selection import names_of
-from paraflex.figures.tables import Cell, Column, Table
 from paraflex.formatting import display_unit, number, quantity, text_symbol
 from paraflex.results.following import HEADLINE, ErrorSpan
 from paraflex.results.linear_summary import HELD_WORDS, HOLDINGS
 from paraflex.results.reduced_runs import COUNTS, DISTANCE, FULL as OF_FULL, reduced_run_figures
 from paraflex.results.reduction_summary import FULL, OWN, STATIC, along_summary
+from .charts import PLAIN_LOOK, Axis, Chart, Curve, Look, Span, look
+from .entry import NOTHING, figure
+from .linear import FREQUENCY
+from .selection import names_of
+from .tables import Cell, Column, Table
 
 _ERRORS, _BASES = "Responses and errors", "Bases of other poses"
 # Largest numbers of outputs, and of frequencies in a row; reduced.nc and reduced.json have all.

@@ -7,12 +7,12 @@ import numpy as np
 import xarray as xr
 
 from paraflex.arrays import Array
-from paraflex.figures.charts import DOTTED, Axis, Chart, Curve, Look, look
-from paraflex.figures.entry import figure
-from paraflex.figures.runs import compared, followed, of_names, ranges, run_names, stopped_runs
-from paraflex.figures.selection import names_of, place_of, point_number
 from paraflex.formatting import peak, text_symbol
 from paraflex.units import EFFORTS
+from .charts import DOTTED, Axis, Chart, Curve, Look, look
+from .entry import figure
+from .runs import compared, followed, of_names, ranges, run_names, stopped_runs
+from .selection import names_of, place_of, point_number
 
 ANGLE = Axis("angle", "rad", "φ")
 ANGLES = Chart("angles", "Angles", ANGLE, choosing="link")

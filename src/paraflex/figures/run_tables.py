@@ -7,14 +7,14 @@ from typing import Any, NamedTuple
 import numpy as np
 import xarray as xr
 
-from paraflex.figures.run_motion import deflections_of, effort_axis, energy_scale
-from paraflex.figures.selection import names_of
-from paraflex.figures.tables import Cell, Column, Table
-from paraflex.figures.tracking import errors
 from paraflex.formatting import peak
 from paraflex.results.controllers import controller_names
 from paraflex.results.following import headline, ranked_by_motion
 from paraflex.results.formulas import during_motion
+from .run_motion import deflections_of, effort_axis, energy_scale
+from .selection import names_of
+from .tables import Cell, Column, Table
+from .tracking import errors
 
 
 class _Row(NamedTuple):

@@ -9,9 +9,9 @@ import xarray as xr
 
 from paraflex.arrays import Array
 from paraflex.errors import InputError
-from paraflex.figures.charts import DOTTED, Axis, Chart, Curve, Look, Span, look
-from paraflex.figures.selection import names_of, samples
 from paraflex.formatting import peak, text_symbol
+from .charts import DOTTED, Axis, Chart, Curve, Look, Span, look
+from .selection import names_of, samples
 
 MOST_SAMPLES = 2000
 # Share of its median above which a curve that begins at zero is drawn on a logarithmic axis.

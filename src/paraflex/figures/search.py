@@ -6,12 +6,12 @@ from typing import Any
 import numpy as np
 
 from paraflex.arrays import Array
-from paraflex.figures.charts import Axis, Chart, Curve, Look, Mark, is_wide, look, stairs
-from paraflex.figures.designs import column_label
-from paraflex.figures.entry import figure
-from paraflex.figures.tables import Column, Table, columns_of, in_row_units
 from paraflex.formatting import common_unit, number, quantity
 from paraflex.units import PERCENT
+from .charts import Axis, Chart, Curve, Look, Mark, is_wide, look, stairs
+from .designs import column_label
+from .entry import figure
+from .tables import Column, Table, columns_of, in_row_units
 
 IDENTIFICATION = "identification"
 _BEST, _FAILED = Look(0), Look(1)

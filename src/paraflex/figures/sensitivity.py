@@ -6,11 +6,11 @@ from typing import Any
 import numpy as np
 
 from paraflex.errors import InputError
-from paraflex.figures.charts import Axis, Chart, Curve, look
-from paraflex.figures.designs import column_label
-from paraflex.figures.entry import figure
-from paraflex.figures.tables import Column, Table, in_row_units
 from paraflex.formatting import number, text_symbol
+from .charts import Axis, Chart, Curve, look
+from .designs import column_label
+from .entry import figure
+from .tables import Column, Table, in_row_units
 
 # Share of the distance of two metrics that their bars fill.
 _FILLED = 0.8

@@ -5,11 +5,11 @@ from collections.abc import Iterator
 import numpy as np
 import xarray as xr
 
-from paraflex.figures.charts import Axis, Chart
-from paraflex.figures.entry import figure
-from paraflex.figures.runs import followed
 from paraflex.results.sensors import READING, SENSOR, sensor_units
 from paraflex.units import DisplayUnit
+from .charts import Axis, Chart
+from .entry import figure
+from .runs import followed
 
 _QUANTITIES = {
     "rad": "angle",

@@ -10,21 +10,13 @@ import numpy as np
 import xarray as xr
 
 from paraflex.errors import InputError
-from paraflex.figures.charts import DASHED, Axis, Chart, Curve, Look, look
-from paraflex.figures.entry import figure
-from paraflex.figures.run_motion import actual_name, effort_axis, of_member, start_mark
-from paraflex.figures.runs import (
-    after_motion,
-    check_magnification,
-    compared,
-    followed,
-    ranges,
-    round_magnification,
-    stopped_runs,
-)
-from paraflex.figures.selection import moving_directions, names_of, of_point, samples
 from paraflex.formatting import ROUNDING, display_unit, number, peak, quantity, text_symbol
 from paraflex.results.following import headline, ranked_by_motion
+from .charts import DASHED, Axis, Chart, Curve, Look, look
+from .entry import figure
+from .run_motion import actual_name, effort_axis, of_member, start_mark
+from .runs import after_motion, check_magnification, compared, followed, ranges, round_magnification, stopped_runs
+from .selection import moving_directions, names_of, of_point, samples
 
 # Axes of the variables of the end-effector's motion: name, unit, and the dots of the symbol above the direction.
 _MOTION = {

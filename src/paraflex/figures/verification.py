@@ -8,13 +8,13 @@ import numpy as np
 import xarray as xr
 
 from paraflex.arrays import Array
-from paraflex.figures.charts import Axis, Chart, Curve, look
-from paraflex.figures.entry import figure
-from paraflex.figures.run_motion import most_deflected
-from paraflex.figures.runs import after_motion, check_magnification, round_magnification
-from paraflex.figures.selection import names_of
-from paraflex.figures.tables import Column, Table
 from paraflex.formatting import peak, text_symbol
+from .charts import Axis, Chart, Curve, look
+from .entry import figure
+from .run_motion import most_deflected
+from .runs import after_motion, check_magnification, round_magnification
+from .selection import names_of
+from .tables import Column, Table
 
 _NAMES = {
     "ked": "KED",

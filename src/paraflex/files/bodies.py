@@ -1,28 +1,17 @@
 """Construction of bodies from their tables in a model file."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import MISSING, fields
 from typing import Any, get_args
 
 from paraflex.errors import InputError
-from paraflex.files.field_values import check_fields
-from paraflex.files.schema import DampingTable, ModelTable, SectionTable
 from paraflex.limits import SHAPE_FUNCTIONS, at_most
-from paraflex.mechanism import (
-    Body,
-    Damping,
-    LumpedMass,
-    Material,
-    ModalPoint,
-    Polynomial,
-    Section,
-    Sine,
-)
+from paraflex.mechanism import Body, Damping, LumpedMass, Material, ModalPoint, Polynomial, Section, Sine
 from paraflex.mechanism.bodies import BODY_KINDS
 from paraflex.mechanism.quantities import known
 from paraflex.mechanism.sections import SHAPES
+from .field_values import check_fields
+from .schema import DampingTable, ModelTable, SectionTable
 
 
 def read_body(name: str, body: Any, table: ModelTable) -> Body:

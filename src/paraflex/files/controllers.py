@@ -1,7 +1,5 @@
 """Construction of controllers from their tables in a model file, and of tables from controllers."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import fields
 from typing import Any
@@ -11,11 +9,11 @@ import numpy as np
 from paraflex.control.laws.described import TABLE, ControllerDescription, check_controllers
 from paraflex.control.laws.kinds import LAWS
 from paraflex.errors import InputError, renamed, within
-from paraflex.files.expressions import evaluate_parameters
-from paraflex.files.field_values import changed_fields, inexpressible
-from paraflex.files.profiles import components_table, read_components
-from paraflex.files.schema import ModelTable, TorqueTable
 from paraflex.mechanism import Mechanism
+from .expressions import evaluate_parameters
+from .field_values import changed_fields, inexpressible
+from .profiles import components_table, read_components
+from .schema import ModelTable, TorqueTable
 
 
 def read_controllers(table: ModelTable, mechanism: Mechanism) -> dict[str, ControllerDescription]:

@@ -4,8 +4,8 @@ import ast
 from collections.abc import Callable, Mapping
 from typing import Any
 
-from paraflex.files.expressions import CONSTANTS, ExpressionError, expressed_in, tree_of
 from paraflex.units import ANGLE, PLAIN, Dimension, dimension_text, unit_named
+from .expressions import CONSTANTS, ExpressionError, expressed_in, tree_of
 
 # Function from a name to its dimension; None where it is unknown, as for the time or a parameter without a unit.
 _Of = Callable[[str], Dimension | None]

@@ -8,7 +8,7 @@ import tomlkit
 from tomlkit.container import OutOfOrderTableProxy
 from tomlkit.items import Item, Key, Table, Whitespace
 
-from paraflex.files.merge import order_of, same
+from .merge import order_of, same
 
 # Content of a table in order: members, and without a key the comments and blank lines.
 _Body = list[tuple[Key | None, Item]]

@@ -14,9 +14,9 @@ import numpy as np
 
 from paraflex.arrays import Array
 from paraflex.errors import InputError, suggestion
-from paraflex.files.jets import FUNCTIONS, Jet
 from paraflex.limits import EXPRESSION_LETTERS, PARAMETER_CHAIN
 from paraflex.units import UNITS, divisors_in, quantities_in, unknown_unit
+from .jets import FUNCTIONS, Jet
 
 CONSTANTS = {"pi": math.pi}
 # Name of the time in expressions.

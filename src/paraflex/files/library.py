@@ -5,7 +5,7 @@ from importlib.resources.abc import Traversable
 
 from paraflex.arguments import checked_arguments
 from paraflex.errors import InputError, suggestion
-from paraflex.files.generators import generated_text, generator_names, is_generated
+from .generators import generated_text, generator_names, is_generated
 
 
 def _folder() -> Traversable:

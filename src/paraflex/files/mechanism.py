@@ -1,28 +1,11 @@
 """Construction of mechanisms and paths from the tables of a model file."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any, cast
 
 from paraflex.control.shaping.shaped import ShapedPath
 from paraflex.control.shaping.shapers import Shaper, ShaperKind
 from paraflex.errors import InputError, within
-from paraflex.files.bodies import read_body, read_section
-from paraflex.files.expressions import evaluate_parameters
-from paraflex.files.field_values import check_fields
-from paraflex.files.profiles import quantities, read_components, read_profile
-from paraflex.files.schema import (
-    PATHS,
-    JointTable,
-    ModelTable,
-    PathTable,
-    PrescribedTable,
-    SequenceTable,
-    ShaperTable,
-    TabulatedPathTable,
-    TorqueTable,
-)
 from paraflex.kinematics import Path
 from paraflex.mechanism import (
     JOINT_KINDS,
@@ -41,6 +24,21 @@ from paraflex.mechanism import (
 )
 from paraflex.mechanism.loads import InTime
 from paraflex.mechanism.quantities import known
+from .bodies import read_body, read_section
+from .expressions import evaluate_parameters
+from .field_values import check_fields
+from .profiles import quantities, read_components, read_profile
+from .schema import (
+    PATHS,
+    JointTable,
+    ModelTable,
+    PathTable,
+    PrescribedTable,
+    SequenceTable,
+    ShaperTable,
+    TabulatedPathTable,
+    TorqueTable,
+)
 
 
 def read_mechanism(table: ModelTable) -> Mechanism:

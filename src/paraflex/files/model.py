@@ -10,19 +10,6 @@ from paraflex.control.laws.described import NONE, ControllerDescription, check_t
 from paraflex.control.shaping.shaped import shape_torques
 from paraflex.equilibria.conditions import StaticsDefaults, conditions
 from paraflex.errors import InputError, renamed, suggestion, within
-from paraflex.files.controllers import read_controllers
-from paraflex.files.field_values import inexpressible
-from paraflex.files.generators import generated_text, generator_names, is_generated
-from paraflex.files.library import library_file, library_names
-from paraflex.files.mechanism import read_mechanism, read_path, read_paths, read_shaper, read_torques
-from paraflex.files.merge import merged, same
-from paraflex.files.overlay import plain, with_values
-from paraflex.files.read import exists, naming, parse_toml, read_text, read_toml, validate
-from paraflex.files.rows import with_names, with_rows
-from paraflex.files.schema import ModelTable, PathFile
-from paraflex.files.start import read_start
-from paraflex.files.study import StudyDefaults, check_study
-from paraflex.files.tables import model_tables
 from paraflex.findings import warn_of
 from paraflex.kinematics import Path
 from paraflex.late import save_file
@@ -31,6 +18,19 @@ from paraflex.mechanism.quantities import known
 from paraflex.tracking import Ending, TrackingTask, plan_tracking
 from paraflex.validity import implausible_numbers
 from paraflex.writing import write_text
+from .controllers import read_controllers
+from .field_values import inexpressible
+from .generators import generated_text, generator_names, is_generated
+from .library import library_file, library_names
+from .mechanism import read_mechanism, read_path, read_paths, read_shaper, read_torques
+from .merge import merged, same
+from .overlay import plain, with_values
+from .read import exists, naming, parse_toml, read_text, read_toml, validate
+from .rows import with_names, with_rows
+from .schema import ModelTable, PathFile
+from .start import read_start
+from .study import StudyDefaults, check_study
+from .tables import model_tables
 
 
 @named_in_errors("a model", "the model that paraflex.load reads")
@@ -257,7 +257,7 @@ class Model(CheckedFields):
         OutputError
             File that cannot be written.
         """
-        from paraflex.files.document import document_text
+        from .document import document_text
 
         path = FilePath(path)
         data = with_names(_data(self), self.text, path.parent)

@@ -6,9 +6,9 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 from paraflex.errors import InputError, suggestion
-from paraflex.files.expressions import ExpressionError, evaluate, evaluate_parameters
-from paraflex.files.fields import Place, field_at, has_tables, is_table, leaves, takes_number, value_at
-from paraflex.files.schema import ModelTable
+from .expressions import ExpressionError, evaluate, evaluate_parameters
+from .fields import Place, field_at, has_tables, is_table, leaves, takes_number, value_at
+from .schema import ModelTable
 
 _BARE = re.compile(r"[A-Za-z0-9_-]+\Z")
 _PART = re.compile(r'\s*(?:"([^"]*)"|\'([^\']*)\'|([^."\'\s]+))\s*(\.|\Z)')

@@ -12,9 +12,9 @@ from typing import Any
 from pydantic import BaseModel, ValidationError
 
 from paraflex.errors import InputError, suggestion
-from paraflex.files.expressions import evaluate_parameters
-from paraflex.files.fields import check_units, field_at
 from paraflex.limits import FILE_BYTES, KEY_PARTS, NAME_LETTERS
+from .expressions import evaluate_parameters
+from .fields import check_units, field_at
 
 # Patterns of numbers with a decimal comma, of unquoted values that TOML does not allow, and of strings and comments,
 # whose brackets are ignored.

@@ -13,12 +13,12 @@ from pathlib import Path
 from typing import Any
 
 from paraflex.errors import InputError
-from paraflex.files.fields import Place, units_at
-from paraflex.files.outside import check_outside, is_outside
-from paraflex.files.overlay import overlaid
-from paraflex.files.read import text_of
-from paraflex.files.schema import ModelTable, PathFile
 from paraflex.units import dimension_text, unit_named, unit_of, unknown_unit
+from .fields import Place, units_at
+from .outside import check_outside, is_outside
+from .overlay import overlaid
+from .read import text_of
+from .schema import ModelTable, PathFile
 
 # Possible numbers of columns of a file, with their names and meanings in errors.
 _TWO, _THREE, _PATH = (2,), (3,), (2, 3)

@@ -4,8 +4,6 @@ Numbers are in SI units and radians; a number with another unit is a text, "80 m
 field (positive lengths, points that exist) are checked once, in `mechanism.checks` and by the paths themselves.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import MISSING, fields
 from enum import Enum
@@ -32,8 +30,6 @@ from paraflex.control.laws.described import ControllerDescription, References
 from paraflex.control.laws.kinds import LAWS
 from paraflex.control.shaping.shapers import Shaper
 from paraflex.equilibria.conditions import StaticsDefaults
-from paraflex.files.expressions import CONSTANTS, ExpressionError, check_in_time, evaluate
-from paraflex.files.study import StudyDefaults
 from paraflex.kinematics import Circle, Line, Path, PointPath, Polygon, SequencePath, TabulatedPath
 from paraflex.limits import LARGEST, TEXT_LETTERS, WHOLE
 from paraflex.mechanism import (
@@ -59,6 +55,8 @@ from paraflex.mechanism.bodies import BODY_KINDS
 from paraflex.mechanism.loads import InTime
 from paraflex.mechanism.quantities import joint_pair
 from paraflex.mechanism.sections import SHAPES
+from .expressions import CONSTANTS, ExpressionError, check_in_time, evaluate
+from .study import StudyDefaults
 
 
 def _number(value: Any, info: ValidationInfo) -> Any:

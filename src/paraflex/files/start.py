@@ -1,7 +1,7 @@
 """Reading of the [start] table of a model file."""
 
-from paraflex.files.schema import DeflectionTable, StartTable
 from paraflex.mechanism import BodyValues, Deflection, Mechanism, PointRef, Start, check_start
+from .schema import DeflectionTable, StartTable
 
 
 def read_start(table: StartTable, mechanism: Mechanism) -> Start:

@@ -9,11 +9,6 @@ from typing import Any
 from paraflex.control.shaping.shaped import ShapedPath
 from paraflex.control.shaping.shapers import Shaper
 from paraflex.errors import InputError, within
-from paraflex.files.controllers import controller_table
-from paraflex.files.field_values import changed_fields, inexpressible
-from paraflex.files.profiles import components_table, profile_parameters, profile_table
-from paraflex.files.schema import PATHS
-from paraflex.files.study import StudyDefaults
 from paraflex.kinematics import Path, SequencePath, TabulatedPath
 from paraflex.mechanism import (
     AppliedTorque,
@@ -37,6 +32,11 @@ from paraflex.mechanism import (
 )
 from paraflex.mechanism.bodies import BODY_KINDS
 from paraflex.mechanism.quantities import joint_pair
+from .controllers import controller_table
+from .field_values import changed_fields, inexpressible
+from .profiles import components_table, profile_parameters, profile_table
+from .schema import PATHS
+from .study import StudyDefaults
 
 _BODIES = {kind: name for name, kind in BODY_KINDS.items()}
 # Properties of beams that a file may give once for all of them, at its top, with their defaults.

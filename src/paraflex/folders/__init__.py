@@ -3,9 +3,9 @@
 If the writer is killed, the next process that opens the folder completes the change.
 """
 
-from paraflex.folders.changes import MANIFEST as MANIFEST, check_inside as check_inside
-from paraflex.folders.held import ResultsFolder as ResultsFolder, added_to as added_to, hold_folder as hold_folder
-from paraflex.folders.kinds import (
+from .changes import MANIFEST as MANIFEST, check_inside as check_inside
+from .held import ResultsFolder as ResultsFolder, added_to as added_to, hold_folder as hold_folder
+from .kinds import (
     COMPARISON as COMPARISON,
     DATA_FILES as DATA_FILES,
     FOLDER_FILES as FOLDER_FILES,
@@ -18,13 +18,13 @@ from paraflex.folders.kinds import (
     VERIFICATION as VERIFICATION,
     ResultKind as ResultKind,
 )
-from paraflex.folders.lock import (
+from .lock import (
     LOCK as LOCK,
     FolderInUseError as FolderInUseError,
     finish_change as finish_change,
     lock_folder as lock_folder,
 )
-from paraflex.folders.manifest import (
+from .manifest import (
     Manifest as Manifest,
     check_listed as check_listed,
     files_of as files_of,

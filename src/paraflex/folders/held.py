@@ -8,19 +8,11 @@ from importlib.metadata import version
 from pathlib import Path
 
 from paraflex.errors import InputError, OutputError
-from paraflex.folders.changes import MANIFEST, NEW, READY, REMOVED, check_place, files_in, finish_moves
-from paraflex.folders.lock import LOCK, FolderInUseError, lock_folder
-from paraflex.folders.manifest import (
-    STUDY_OF_RUNS,
-    Manifest,
-    contents_of,
-    digest_of,
-    files_of,
-    kind_of_folder,
-    whole_manifest,
-)
 from paraflex.interrupts import uninterrupted
 from paraflex.writing import ELSEWHERE, unwritable, write_json
+from .changes import MANIFEST, NEW, READY, REMOVED, check_place, files_in, finish_moves
+from .lock import LOCK, FolderInUseError, lock_folder
+from .manifest import STUDY_OF_RUNS, Manifest, contents_of, digest_of, files_of, kind_of_folder, whole_manifest
 
 
 class ResultsFolder:

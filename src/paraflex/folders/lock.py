@@ -7,8 +7,8 @@ from contextlib import closing, contextmanager
 from pathlib import Path
 
 from paraflex.errors import InputError
-from paraflex.folders.changes import READY, finish_moves
 from paraflex.writing import ELSEWHERE, unwritable
+from .changes import READY, finish_moves
 
 LOCK = ".lock"
 # Time that a reader waits for a writer that moves files, and interval between its checks [s].

@@ -10,12 +10,12 @@ from pathlib import Path
 from typing import Any
 
 from paraflex.errors import InputError
-from paraflex.folders.changes import MANIFEST, NEW, READY, files_in, is_inside
-from paraflex.folders.kinds import FOLDER_FILES, STUDY_OF_RUNS
-from paraflex.folders.lock import LOCK, finish_change
 from paraflex.interrupts import uninterrupted
 from paraflex.seals import damaged
 from paraflex.writing import read_json
+from .changes import MANIFEST, NEW, READY, files_in, is_inside
+from .kinds import FOLDER_FILES, STUDY_OF_RUNS
+from .lock import LOCK, finish_change
 
 # Further files of a study of many runs, in the manifest or not, because they come and go while it runs.
 _OF_STUDY = (

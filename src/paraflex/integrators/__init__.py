@@ -1,21 +1,21 @@
 """Time integration: methods as objects, own schemes by tableaux and coefficients, adapters to SciPy and SUNDIALS."""
 
-from paraflex.integrators.events import (
+from .events import (
     DeflectionLimit as DeflectionLimit,
     Event as Event,
     JointLimit as JointLimit,
     SingularDistance as SingularDistance,
     check_events as check_events,
 )
-from paraflex.integrators.integrate import integrate as integrate
-from paraflex.integrators.methods import (
+from .integrate import integrate as integrate
+from .methods import (
     DEFAULT_METHOD as DEFAULT_METHOD,
     METHODS as METHODS,
     Method as Method,
     Treatment as Treatment,
     find_method as find_method,
 )
-from paraflex.integrators.options import (
+from .options import (
     Control as Control,
     IntegrationOptions as IntegrationOptions,
     TolerancePer as TolerancePer,
@@ -23,5 +23,5 @@ from paraflex.integrators.options import (
     choose as choose,
     loose_tolerance as loose_tolerance,
 )
-from paraflex.integrators.run import make_problem as make_problem
-from paraflex.integrators.solution import Solution as Solution
+from .run import make_problem as make_problem
+from .solution import Solution as Solution

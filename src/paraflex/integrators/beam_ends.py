@@ -10,10 +10,10 @@ from paraflex.arrays import Array
 from paraflex.dynamics import State, System
 from paraflex.errors import InputError, Moment, UnreachablePathError
 from paraflex.findings import Finding
-from paraflex.integrators.crossing import Crossing, first_crossing
-from paraflex.integrators.event_functions import EventFunction, beam_end_functions
-from paraflex.integrators.events import BeamEnd
 from paraflex.mechanism import AtEnd
+from .crossing import Crossing, first_crossing
+from .event_functions import EventFunction, beam_end_functions
+from .events import BeamEnd
 
 
 @dataclass(frozen=True)

@@ -16,8 +16,8 @@ from paraflex.dynamics import System
 from paraflex.dynamics.joint_loads import drive_torques, joint_loads
 from paraflex.dynamics.sections import sections_of
 from paraflex.findings import Finding
-from paraflex.integrators.limits import StepLimits
-from paraflex.integrators.solution import Solution
+from .limits import StepLimits
+from .solution import Solution
 
 # Code of the finding, and the field it refers to: the number of samples.
 COARSE = "samples-coarse"

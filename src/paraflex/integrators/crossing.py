@@ -9,13 +9,13 @@ import scipy
 
 from paraflex.arrays import Array
 from paraflex.dynamics import State
-from paraflex.integrators.event_functions import EventFunction
-from paraflex.integrators.native import NativeRun, prepare
-from paraflex.integrators.options import IntegrationOptions
-from paraflex.integrators.run import Instant, Problem, Run
 from paraflex.kernel.bodies import weight_work
 from paraflex.kernel.packed import make_scratch
 from paraflex.kernel.run_state import PAUSED, Samples
+from .event_functions import EventFunction
+from .native import NativeRun, prepare
+from .options import IntegrationOptions
+from .run import Instant, Problem, Run
 
 # Fractions of a step at which events are checked, its end last; an excursion between two of them is missed.
 _PLACES = np.array([0.25, 0.5, 0.75, 1.0])

@@ -19,8 +19,8 @@ from paraflex.dynamics import (
 )
 from paraflex.errors import InputError
 from paraflex.fem import slope_square_integrals
-from paraflex.integrators.events import BeamEnd, DeflectionLimit, Event, JointLimit, beam_ends, check_events
 from paraflex.mechanism import AtEnd
+from .events import BeamEnd, DeflectionLimit, Event, JointLimit, beam_ends, check_events
 
 # Number of points within an element at which the deflection is evaluated, its last end included.
 _PLACES = 4

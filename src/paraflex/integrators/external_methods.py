@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from typing import ClassVar
 
-from paraflex.integrators.method import EQUATIONS_INDEX_1, EQUATIONS_ODE, Family, Method, Treatment, parameter
+from .method import EQUATIONS_INDEX_1, EQUATIONS_ODE, Family, Method, Treatment, parameter
 
 
 class ExternalMethod(Method):

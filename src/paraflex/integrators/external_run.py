@@ -1,7 +1,5 @@
 """Runs by external solvers: stops, samples, energies and counts around a `Stepper`."""
 
-from __future__ import annotations
-
 import math
 import time
 
@@ -11,18 +9,18 @@ import scipy
 from paraflex.arrays import Array
 from paraflex.errors import InputError, StiffnessWarning
 from paraflex.findings import Finding, warn_of
-from paraflex.integrators.external_methods import IDA, ExternalMethod, SciPyMethod
-from paraflex.integrators.forms import DescriptorForm, OdeForm, StabilisedForm
-from paraflex.integrators.method import Method, Treatment
-from paraflex.integrators.options import IntegrationOptions
-from paraflex.integrators.run import FIRST_STEP, Figures, Instant, Problem, empty_samples
-from paraflex.integrators.scipy_methods import ScipyStepper
-from paraflex.integrators.stepper import Stepper, Steps
-from paraflex.integrators.sundials import CvodeStepper, IdaStepper
 from paraflex.kernel.bodies import stored_energy
 from paraflex.kernel.linear import factor_system
 from paraflex.kernel.packed import make_scratch
 from paraflex.kernel.run_state import FINISHED, PAUSED, Samples
+from .external_methods import IDA, ExternalMethod, SciPyMethod
+from .forms import DescriptorForm, OdeForm, StabilisedForm
+from .method import Method, Treatment
+from .options import IntegrationOptions
+from .run import FIRST_STEP, Figures, Instant, Problem, empty_samples
+from .scipy_methods import ScipyStepper
+from .stepper import Stepper, Steps
+from .sundials import CvodeStepper, IdaStepper
 
 # With order p errors add up to h^p, while that of a step is h^(p + 1). The tolerance of multistep methods is used as it
 # is at this value [m], and is raised to the power (p + 1) / p elsewhere.

@@ -10,12 +10,12 @@ import numpy as np
 
 from paraflex.arrays import Array, Indices
 from paraflex.dynamics import System, dependence, inputs_of
-from paraflex.integrators.options import IntegrationOptions
-from paraflex.integrators.run import DEPENDENT_PART, Problem
 from paraflex.kernel import ode
 from paraflex.kernel.error import MEMORY_PART
 from paraflex.kernel.packed import OMEGA2, Signals
 from paraflex.kernel.tangent import make_tangent
+from .options import IntegrationOptions
+from .run import DEPENDENT_PART, Problem
 
 # Tolerance of a component whose error does not count [any unit].
 _IGNORED = 1e20

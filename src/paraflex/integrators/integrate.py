@@ -13,31 +13,25 @@ from paraflex.arrays import Array
 from paraflex.dynamics import State, System, dependence
 from paraflex.dynamics.change_points import dependent_drives
 from paraflex.dynamics.rank import DENSE_ROWS
-from paraflex.errors import (
-    ConstraintDriftError,
-    IntegrationError,
-    Moment,
-    SingularPositionError,
-    SliderOffBeamError,
-)
-from paraflex.integrators.beam_ends import STAY_ON_BEAM, BeamEnds
-from paraflex.integrators.between import samples_too_few, with_between
-from paraflex.integrators.crossing import Crossing, advance, samples_until
-from paraflex.integrators.event_functions import event_functions
-from paraflex.integrators.events import BeamEnd
-from paraflex.integrators.external_run import prepare as prepare_outside
-from paraflex.integrators.limits import elements_too_few
-from paraflex.integrators.method import Family, NativeMethod
-from paraflex.integrators.native import own, prepare as prepare_native
-from paraflex.integrators.options import IntegrationOptions, loose_tolerance, refuse_tolerance
-from paraflex.integrators.pace import Pace, too_slow
-from paraflex.integrators.run import Instant, Problem, Run, make_problem
-from paraflex.integrators.solution import Solution
-from paraflex.integrators.watch import Breakdown, excessive_bending, least_norm, open_constraint
+from paraflex.errors import ConstraintDriftError, IntegrationError, Moment, SingularPositionError, SliderOffBeamError
 from paraflex.kernel.packed import Signals
 from paraflex.kernel.run_state import ERROR_TEST, FINISHED, LAW_FAILED, NO_CONVERGENCE, NOT_FINITE, PAUSED
 from paraflex.kernel.sampled import SampledLaw, no_law
 from paraflex.mechanism import AtEnd
+from .beam_ends import STAY_ON_BEAM, BeamEnds
+from .between import samples_too_few, with_between
+from .crossing import Crossing, advance, samples_until
+from .event_functions import event_functions
+from .events import BeamEnd
+from .external_run import prepare as prepare_outside
+from .limits import elements_too_few
+from .method import Family, NativeMethod
+from .native import own, prepare as prepare_native
+from .options import IntegrationOptions, loose_tolerance, refuse_tolerance
+from .pace import Pace, too_slow
+from .run import Instant, Problem, Run, make_problem
+from .solution import Solution
+from .watch import Breakdown, excessive_bending, least_norm, open_constraint
 
 # Attempted steps between two checks: some milliseconds for a dozen bodies.
 _SLICE = 200

@@ -13,7 +13,7 @@ import scipy
 
 from paraflex.arrays import Array, Indices, NDArray
 from paraflex.errors import IntegrationError, Moment
-from paraflex.integrators.newmark import NewmarkNumbers
+from .newmark import NewmarkNumbers
 
 # Samples whose linear algebra is done at once: some megabytes for a dozen bodies.
 _INSTANTS_AT_ONCE = 128

@@ -8,22 +8,10 @@ from collections.abc import Mapping
 from types import MappingProxyType
 
 from paraflex.errors import InputError, suggestion, within
-from paraflex.integrators.external_methods import (
-    BDF as BDF,
-    IDA as IDA,
-    NDF as NDF,
-    RK45 as RK45,
-    Adams as Adams,
-    Radau as Radau,
-)
-from paraflex.integrators.method import Family as Family, Method as Method, Treatment as Treatment
-from paraflex.integrators.newmark import (
-    HHT as HHT,
-    GeneralisedAlpha as GeneralisedAlpha,
-    Newmark as Newmark,
-    Wilson as Wilson,
-)
-from paraflex.integrators.tableaux import (
+from .external_methods import BDF as BDF, IDA as IDA, NDF as NDF, RK45 as RK45, Adams as Adams, Radau as Radau
+from .method import Family as Family, Method as Method, Treatment as Treatment
+from .newmark import HHT as HHT, GeneralisedAlpha as GeneralisedAlpha, Newmark as Newmark, Wilson as Wilson
+from .tableaux import (
     ESDIRK3 as ESDIRK3,
     ESDIRK4 as ESDIRK4,
     ESDIRK5 as ESDIRK5,

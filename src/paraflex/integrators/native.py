@@ -9,11 +9,6 @@ from paraflex.arrays import Array, Indices
 from paraflex.dynamics import System, inputs_of
 from paraflex.dynamics.linearise import slowest_deflection
 from paraflex.errors import InputError
-from paraflex.integrators.method import NativeMethod, Treatment
-from paraflex.integrators.newmark import NewmarkMethod
-from paraflex.integrators.options import Control, IntegrationOptions, TolerancePer
-from paraflex.integrators.run import DEPENDENT_PART, FIRST_STEP, Figures, Instant, Problem, Run, empty_samples
-from paraflex.integrators.singular_start import BranchPose, begin_on_branch, pose_on_branch
 from paraflex.kernel import indices as at
 from paraflex.kernel.linear import factor_system
 from paraflex.kernel.march import march, start
@@ -32,6 +27,11 @@ from paraflex.kernel.run_state import (
     make_march,
 )
 from paraflex.kernel.sampled import SampledLaw, no_law
+from .method import NativeMethod, Treatment
+from .newmark import NewmarkMethod
+from .options import Control, IntegrationOptions, TolerancePer
+from .run import DEPENDENT_PART, FIRST_STEP, Figures, Instant, Problem, Run, empty_samples
+from .singular_start import BranchPose, begin_on_branch, pose_on_branch
 
 # A row not redundant at the start is dependent, except for rounding, below this relative pivot.
 ROUNDING_PART = 1e-13

@@ -7,8 +7,8 @@ from typing import ClassVar
 import numpy as np
 
 from paraflex.errors import InputError
-from paraflex.integrators.method import EQUATIONS_INDEX_3, Family, NativeMethod, Treatment, parameter
 from paraflex.kernel.run_state import Tableau
+from .method import EQUATIONS_INDEX_3, Family, NativeMethod, Treatment, parameter
 
 
 @dataclass(frozen=True)

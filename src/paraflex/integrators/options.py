@@ -12,10 +12,10 @@ from paraflex.arguments import CheckedFields, checked_arguments, named_in_errors
 from paraflex.dynamics import System
 from paraflex.errors import InputError, as_enum
 from paraflex.findings import Finding
-from paraflex.integrators.events import Event
-from paraflex.integrators.method import Family, NativeMethod
-from paraflex.integrators.methods import Method, MethodField, Treatment
 from paraflex.limits import SAMPLES, SHORTEST, at_most
+from .events import Event
+from .method import Family, NativeMethod
+from .methods import Method, MethodField, Treatment
 
 # A tolerance above this part of the mechanism's size gives a finding: at a fifth of the size the tracking error of the
 # five-bar is larger by a half.

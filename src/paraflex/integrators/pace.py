@@ -5,11 +5,10 @@ from collections import deque
 
 import numpy as np
 
-from paraflex.dynamics import System
-from paraflex.dynamics.singularity import SingularityMeasure
-from paraflex.integrators.run import Instant
-from paraflex.integrators.watch import Breakdown
+from paraflex.dynamics import SingularityMeasure, System
 from paraflex.mechanism import RigidBody
+from .run import Instant
+from .watch import Breakdown
 
 # Default limit of the number of steps of a run.
 MOST_STEPS = 10_000_000

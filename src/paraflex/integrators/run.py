@@ -13,10 +13,10 @@ from numpy.polynomial.polynomial import polyder, polyval
 from paraflex.arrays import Array, Mask
 from paraflex.dynamics import Inputs, State, System, inputs_of
 from paraflex.errors import InputError
-from paraflex.integrators.limits import StepLimits, step_limits
 from paraflex.kernel.arrays import allocated
 from paraflex.kernel.packed import Signals
 from paraflex.kernel.run_state import Samples
+from .limits import StepLimits, step_limits
 
 # Size of the first step, as a fraction of the run; error control adjusts it at once.
 FIRST_STEP = 1e-6

@@ -1,7 +1,5 @@
 """SciPy's solvers of ordinary differential equations, one step at a time: a `Stepper`."""
 
-from __future__ import annotations
-
 import math
 import warnings
 
@@ -9,10 +7,10 @@ import numpy as np
 import scipy
 
 from paraflex.arrays import Array
-from paraflex.integrators.external_methods import SciPyMethod
-from paraflex.integrators.forms import OdeForm
-from paraflex.integrators.stepper import SolverCounts, Stepper, Steps, attempts
 from paraflex.kernel.run_state import ERROR_TEST, NOT_FINITE, PAUSED
+from .external_methods import SciPyMethod
+from .forms import OdeForm
+from .stepper import SolverCounts, Stepper, Steps, attempts
 
 # Smallest relative tolerance that SciPy accepts without a warning.
 _RELATIVE = 1e-13

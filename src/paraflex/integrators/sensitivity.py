@@ -9,12 +9,6 @@ import numpy as np
 from paraflex.arrays import Array
 from paraflex.dynamics import inputs_of, numbers_of, with_numbers
 from paraflex.errors import InputError, IntegrationError, Moment, SliderOffBeamError
-from paraflex.integrators.beam_ends import STAY_ON_BEAM, BeamEnds
-from paraflex.integrators.integrate import CAUSES
-from paraflex.integrators.methods import METHODS, Family, Treatment
-from paraflex.integrators.native import NativeRun, prepare
-from paraflex.integrators.options import IntegrationOptions
-from paraflex.integrators.run import Problem, empty_samples
 from paraflex.kernel import indices as at
 from paraflex.kernel.arrays import allocated
 from paraflex.kernel.krylov import make_krylov
@@ -24,6 +18,12 @@ from paraflex.kernel.run_state import FINISHED, PAUSED, make_march
 from paraflex.kernel.sensitivity import make_piece, sensitivity_steps
 from paraflex.kernel.sensitivity_samples import DIFFERENCE_STEP, PLACES, Sensitivity
 from paraflex.kernel.tangent import make_tangent
+from .beam_ends import STAY_ON_BEAM, BeamEnds
+from .integrate import CAUSES
+from .methods import METHODS, Family, Treatment
+from .native import NativeRun, prepare
+from .options import IntegrationOptions
+from .run import Problem, empty_samples
 
 # Number of steps in memory at a time.
 _STEPS_AT_ONCE = 256

@@ -14,15 +14,14 @@ import numpy as np
 import scipy
 
 from paraflex.arrays import Array
-from paraflex.dynamics import dependence
+from paraflex.dynamics import dependence, moment_signals
 from paraflex.dynamics.projection import assemble, closed, constraint_change, link_metric, project
 from paraflex.dynamics.rank import DENSE_ROWS
-from paraflex.dynamics.signals import moment_signals
-from paraflex.integrators.run import Problem
 from paraflex.kernel import indices as at
 from paraflex.kernel.linear import factor_system
 from paraflex.kernel.packed import Workspace
 from paraflex.kernel.run_state import March
+from .run import Problem
 
 # Distance from the start at which the motion is examined [rad, sizes of the mechanism].
 _BESIDE = 1e-2

@@ -10,7 +10,7 @@ from paraflex.arrays import Array, Indices
 from paraflex.findings import Finding
 
 if TYPE_CHECKING:
-    from paraflex.integrators.options import IntegrationOptions
+    from .options import IntegrationOptions
 
 
 @dataclass(frozen=True)

@@ -13,9 +13,9 @@ import scipy
 
 from paraflex.arrays import ArrayLike, NDArray, Numbers
 from paraflex.errors import InputError
-from paraflex.integrators.methods import METHODS, NDF, RK45, Adams, Method, Radau, find_method
-from paraflex.integrators.newmark import NewmarkMethod, NewmarkNumbers
-from paraflex.integrators.tableaux import ESDIRK
+from .methods import METHODS, NDF, RK45, Adams, Method, Radau, find_method
+from .newmark import NewmarkMethod, NewmarkNumbers
+from .tableaux import ESDIRK
 
 Roots = NDArray[Any]
 

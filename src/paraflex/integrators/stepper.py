@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from paraflex.arrays import Array
-from paraflex.integrators.forms import OdeForm
+from .forms import OdeForm
 
 # Times that differ by less than this fraction of the step count as equal.
 _SAME_TIME = 1e-9

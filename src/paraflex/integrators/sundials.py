@@ -1,7 +1,5 @@
 """CVODE and IDA of SUNDIALS through scikit-sundae, one step at a time: each a `Stepper`."""
 
-from __future__ import annotations
-
 import contextlib
 import io
 import math
@@ -13,10 +11,10 @@ import numpy as np
 
 from paraflex.arrays import Array
 from paraflex.errors import optional_package
-from paraflex.integrators.external_methods import ExternalMethod
-from paraflex.integrators.forms import DescriptorForm, OdeForm
-from paraflex.integrators.stepper import SolverCounts, Stepper, Steps, attempts
 from paraflex.kernel.run_state import ERROR_TEST, NO_CONVERGENCE, NOT_FINITE, PAUSED
+from .external_methods import ExternalMethod
+from .forms import DescriptorForm, OdeForm
+from .stepper import SolverCounts, Stepper, Steps, attempts
 
 # Smallest relative tolerance that SUNDIALS recommends.
 _RELATIVE = 1e-15

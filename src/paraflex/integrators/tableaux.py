@@ -7,8 +7,8 @@ from typing import ClassVar
 
 import numpy as np
 
-from paraflex.integrators.method import EQUATIONS_INDEX_1, Family, NativeMethod, Treatment
 from paraflex.kernel.run_state import Tableau
+from .method import EQUATIONS_INDEX_1, Family, NativeMethod, Treatment
 
 Number = str | float
 

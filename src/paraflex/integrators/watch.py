@@ -8,8 +8,8 @@ from paraflex.arrays import Array
 from paraflex.dynamics import System, dependence
 from paraflex.dynamics.projection import AGREE, contradiction, gap_texts
 from paraflex.dynamics.rank import constraint_jacobian
-from paraflex.integrators.methods import Treatment
 from paraflex.kernel.packed import Signals
+from .methods import Treatment
 
 # Largest slope [rad]: beyond it no theory of small slopes is valid, and the run diverges.
 _LARGEST_SLOPE = 2.0

@@ -13,7 +13,7 @@ from typing import Any, TypeVar, get_type_hints
 import numpy as np
 
 from paraflex.arrays import Array, Indices, NDArray
-from paraflex.kernel.compiling import inlined, routine
+from .compiling import inlined, routine
 
 Floats = Array
 Ints = Indices

@@ -10,9 +10,9 @@ below the point, a *track*. A distance joint prescribes the value |d| of an axis
 
 from math import atan2, cos, sin
 
-from paraflex.kernel.compiling import inlined, kernel, routine
-from paraflex.kernel.joints import apply_force, apply_torque, end_motion, marker_angles, row_part
-from paraflex.kernel.packed import CONSTRAINT
+from .compiling import inlined, kernel, routine
+from .joints import apply_force, apply_torque, end_motion, marker_angles, row_part
+from .packed import CONSTRAINT
 
 
 @inlined

@@ -7,10 +7,10 @@ p'' as for any point. The mass matrix is the sum of m J^T J, which is positive d
 
 from math import cos, sin, sqrt
 
-from paraflex.kernel.compiling import inlined, kernel, routine
-from paraflex.kernel.packed import ANGLE, AXIS, DAMPING, MPF, OMEGA2, S2X, S2Y
-from paraflex.kernel.sums import column_sums, row_product
-from paraflex.kernel.vectors import LANES, add_product, add_scaled, load, padded, store, summed, zeros
+from .compiling import inlined, kernel, routine
+from .packed import ANGLE, AXIS, DAMPING, MPF, OMEGA2, S2X, S2Y
+from .sums import column_sums, row_product
+from .vectors import LANES, add_product, add_scaled, load, padded, store, summed, zeros
 
 
 @inlined

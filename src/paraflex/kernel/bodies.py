@@ -6,12 +6,12 @@ diagonal if the body's joints hold it as its frame does.
 
 from math import cos, sin
 
-from paraflex.kernel.bending import second_order_energy, second_order_equations, second_order_shortening
-from paraflex.kernel.compiling import inlined, kernel
-from paraflex.kernel.joints import apply_lines, apply_loads, line_energy, spring_energy
-from paraflex.kernel.packed import DAMPING, OMEGA2, S2X, S2Y
-from paraflex.kernel.sums import GJ_SUM, I1_SUM, S2X_SUM, S2Y_SUM, body_products, body_sums, clear_shares, hand_on
-from paraflex.kernel.vectors import LANES, add_scaled, load, store, zeros
+from .bending import second_order_energy, second_order_equations, second_order_shortening
+from .compiling import inlined, kernel
+from .joints import apply_lines, apply_loads, line_energy, spring_energy
+from .packed import DAMPING, OMEGA2, S2X, S2Y
+from .sums import GJ_SUM, I1_SUM, S2X_SUM, S2Y_SUM, body_products, body_sums, clear_shares, hand_on
+from .vectors import LANES, add_scaled, load, store, zeros
 
 
 @inlined

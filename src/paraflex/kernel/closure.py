@@ -2,13 +2,13 @@
 
 from typing import Annotated, NamedTuple
 
-from paraflex.kernel import joints
-from paraflex.kernel.arrays import Floats, Ints, allocated, copy, fill, largest
-from paraflex.kernel.axes import apply_axes
-from paraflex.kernel.compiling import by_reference, inlined, releases_lock, routine, unoptimised
-from paraflex.kernel.constraints import constraint_values, fill_jacobian
-from paraflex.kernel.dense import factor_dense, solve_factored
-from paraflex.kernel.packed import INDEX_1, PackedSystem, Scratch, make_scratch, sizes_of
+from . import joints
+from .arrays import Floats, Ints, allocated, copy, fill, largest
+from .axes import apply_axes
+from .compiling import by_reference, inlined, releases_lock, routine, unoptimised
+from .constraints import constraint_values, fill_jacobian
+from .dense import factor_dense, solve_factored
+from .packed import INDEX_1, PackedSystem, Scratch, make_scratch, sizes_of
 
 MAX_ITERATIONS = 20
 # Number of iterations with the factors of the previous sample.

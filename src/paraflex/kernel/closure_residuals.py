@@ -1,8 +1,8 @@
 """Residuals of the equations of closed loops for a given motion, used for derivatives."""
 
-from paraflex.kernel.closure import closure_jacobian, second_derivatives
-from paraflex.kernel.compiling import releases_lock
-from paraflex.kernel.constraints import constraint_values
+from .closure import closure_jacobian, second_derivatives
+from .compiling import releases_lock
+from .constraints import constraint_values
 
 
 @releases_lock

@@ -8,13 +8,13 @@ from typing import Any
 from numba import types
 from numba.extending import typeof_impl
 
-from paraflex.kernel.plain import PLAIN
+from .plain import PLAIN
 
 if PLAIN:
-    from paraflex.kernel.plain import by_reference, compiled
+    from .plain import by_reference, compiled
 else:
-    from paraflex.kernel.machine_code import compiled
-    from paraflex.kernel.records import by_reference
+    from .machine_code import compiled
+    from .records import by_reference
 
 __all__ = ["FAST_MATH", "Kernel", "by_reference", "inlined", "kernel", "releases_lock", "routine", "unoptimised"]
 

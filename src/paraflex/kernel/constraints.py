@@ -2,13 +2,13 @@
 
 from math import cosh
 
-from paraflex.kernel import joints
-from paraflex.kernel.arrays import fill
-from paraflex.kernel.axes import axis_motion, axis_values, fill_axis_rows
-from paraflex.kernel.compiling import inlined, kernel, routine, unoptimised
-from paraflex.kernel.packed import ANGLE, AXIS, CONSTRAINT, DAMPER, FRICTION
-from paraflex.kernel.signals import evaluate_signal
-from paraflex.kernel.sums import body_sums
+from . import joints
+from .arrays import fill
+from .axes import axis_motion, axis_values, fill_axis_rows
+from .compiling import inlined, kernel, routine, unoptimised
+from .packed import ANGLE, AXIS, CONSTRAINT, DAMPER, FRICTION
+from .signals import evaluate_signal
+from .sums import body_sums
 
 # Sliding friction has nearly zero slope: to keep its compliance finite, the slope is at least this fraction of the
 # steepest.

@@ -1,6 +1,6 @@
 """Gaussian elimination of small dense systems, which compiles in one second; a LAPACK call takes eight."""
 
-from paraflex.kernel.compiling import kernel
+from .compiling import kernel
 
 
 @kernel

@@ -16,8 +16,8 @@ from typing import Any
 
 from numba.core.caching import FunctionCache, IndexDataCacheFile
 
-from paraflex.kernel.notice import announce_damage, announce_disk_full
-from paraflex.kernel.plain import STATE
+from .notice import announce_damage, announce_disk_full
+from .plain import STATE
 
 # Number of states kept: a checkout may be used by several environments, a cache in a home folder by several machines.
 STATES_KEPT = 3

@@ -5,15 +5,15 @@ Without the filter (Hosea and Shampine 1996) an undamped axial mode would determ
 
 from math import exp, isinf
 
-from paraflex.kernel import indices as at
-from paraflex.kernel.arrays import copy, fill, largest
-from paraflex.kernel.bending import subtract_geometric
-from paraflex.kernel.compiling import inlined, routine
-from paraflex.kernel.constraints import note_friction
-from paraflex.kernel.linear import factor_system, jacobian_times, solve_system, to_body_frame, to_ground_frame
-from paraflex.kernel.metric import mass_norm, mass_times
-from paraflex.kernel.packed import OMEGA2
-from paraflex.kernel.stage import largest_part
+from . import indices as at
+from .arrays import copy, fill, largest
+from .bending import subtract_geometric
+from .compiling import inlined, routine
+from .constraints import note_friction
+from .linear import factor_system, jacobian_times, solve_system, to_body_frame, to_ground_frame
+from .metric import mass_norm, mass_times
+from .packed import OMEGA2
+from .stage import largest_part
 
 # Number of steps after which the factor that filters velocity errors is renewed; a norm needs no recent one.
 SLOW_AGE = 25

@@ -9,14 +9,14 @@ and keeps an old factor accurate. In second-order geometry, and if damping coupl
 
 from math import sqrt
 
-from paraflex.kernel.arrays import fill
-from paraflex.kernel.axes import add_track, turn_axes
-from paraflex.kernel.bending import factor_dense_body, respond_dense
-from paraflex.kernel.compiling import inlined, kernel, routine
-from paraflex.kernel.joints import marker_shape, marker_shortening, shorten
-from paraflex.kernel.packed import ANGLE, DAMPING, DINV, GJ, MPF, NX, NY, OMEGA2, S2X, S2Y, SLOPE
-from paraflex.kernel.sums import I1_SUM, S2X_SUM, S2Y_SUM, body_products, body_sums
-from paraflex.kernel.vectors import LANES, add_scaled, load, store, zeros
+from .arrays import fill
+from .axes import add_track, turn_axes
+from .bending import factor_dense_body, respond_dense
+from .compiling import inlined, kernel, routine
+from .joints import marker_shape, marker_shortening, shorten
+from .packed import ANGLE, DAMPING, DINV, GJ, MPF, NX, NY, OMEGA2, S2X, S2Y, SLOPE
+from .sums import I1_SUM, S2X_SUM, S2Y_SUM, body_products, body_sums
+from .vectors import LANES, add_scaled, load, store, zeros
 
 # Rows of springs are divided by b; if it is zero (accelerations at one time), they are divided by this.
 SMALLEST_B = 1e-18

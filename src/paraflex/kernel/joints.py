@@ -8,11 +8,11 @@ reduced by f/2, f'/2 and f''/2 along x.
 
 from math import cos, sin, sqrt, tanh
 
-from paraflex.kernel.compiling import inlined, kernel, routine
-from paraflex.kernel.packed import ANGLE, AXIS, CONSTRAINT, DAMPING, FRICTION, NX, NY, SLOPE, SPRING
-from paraflex.kernel.signals import evaluate_signal
-from paraflex.kernel.sums import body_sums, clear_shares, hand_on
-from paraflex.kernel.vectors import LANES, add_scaled, load, store, zeros
+from .compiling import inlined, kernel, routine
+from .packed import ANGLE, AXIS, CONSTRAINT, DAMPING, FRICTION, NX, NY, SLOPE, SPRING
+from .signals import evaluate_signal
+from .sums import body_sums, clear_shares, hand_on
+from .vectors import LANES, add_scaled, load, store, zeros
 
 
 @inlined

@@ -9,10 +9,10 @@ Schultz, 1986).
 from math import hypot, sqrt
 from typing import Annotated, NamedTuple
 
-from paraflex.kernel.arrays import Floats, allocated, fill
-from paraflex.kernel.compiling import by_reference, inlined, kernel, routine
-from paraflex.kernel.linear import solve_residuals
-from paraflex.kernel.tangent import residual_tangent
+from .arrays import Floats, allocated, fill
+from .compiling import by_reference, inlined, kernel, routine
+from .linear import solve_residuals
+from .tangent import residual_tangent
 
 # Largest number of basis vectors, and relative residual to which a system is solved.
 MOST_VECTORS, ENOUGH = 60, 1e-12

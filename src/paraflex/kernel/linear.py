@@ -7,14 +7,14 @@ of a row is the part of its diagonal entry that remains when the rows before it 
 
 from math import cos, sin, sqrt
 
-from paraflex.kernel.arrays import fill
-from paraflex.kernel.axes import turn_axes
-from paraflex.kernel.bending import inverse_times
-from paraflex.kernel.compiling import inlined, kernel, routine, unoptimised
-from paraflex.kernel.factor import factor_bodies, solve_rigid
-from paraflex.kernel.packed import ANGLE, AXIS, CONSTRAINT, DINV, POINT, SPRING
-from paraflex.kernel.sums import row_product
-from paraflex.kernel.vectors import LANES, add_scaled, load, store, zeros
+from .arrays import fill
+from .axes import turn_axes
+from .bending import inverse_times
+from .compiling import inlined, kernel, routine, unoptimised
+from .factor import factor_bodies, solve_rigid
+from .packed import ANGLE, AXIS, CONSTRAINT, DINV, POINT, SPRING
+from .sums import row_product
+from .vectors import LANES, add_scaled, load, store, zeros
 
 # A smaller relative pivot marks a constraint row that depends on the rows before it.
 DEPENDENT_ROW = 1e-12

@@ -19,9 +19,9 @@ from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import CompilerBase
 from numba.core.compiler_machinery import PassManager
 
-from paraflex.kernel.disk_cache import KernelCache
-from paraflex.kernel.notice import announce_compiling
-from paraflex.kernel.passes import kernel_passes, remembered_signatures
+from .disk_cache import KernelCache
+from .notice import announce_compiling
+from .passes import kernel_passes, remembered_signatures
 
 # Optimisation level of LLVM, 0 to 3.
 _LITTLE = 0

@@ -2,23 +2,23 @@
 
 from math import ceil, inf, pi, sqrt
 
-from paraflex.kernel import indices as at, samples
-from paraflex.kernel.arrays import copy, fill, last_before
-from paraflex.kernel.bodies import stored_energy
-from paraflex.kernel.compiling import kernel, releases_lock, routine
-from paraflex.kernel.constraints import constraint_values, note_friction
-from paraflex.kernel.error import note_forces
-from paraflex.kernel.factor import factor_bodies
-from paraflex.kernel.linear import SINGULAR_PART, orient
-from paraflex.kernel.metric import mass_norm
-from paraflex.kernel.near import note_crossing
-from paraflex.kernel.newmark import restart_algorithmic
-from paraflex.kernel.packed import INDEX_1
-from paraflex.kernel.projection import project
-from paraflex.kernel.run_state import BAUMGARTE, ENTERS, ERROR_TEST, FINISHED, LAW_FAILED, PAUSED, PROJECTION
-from paraflex.kernel.sampled import CHANGED, FAILED, SLACK, control, next_instant
-from paraflex.kernel.stage import solve_linear
-from paraflex.kernel.step import attempt, input_power
+from . import indices as at, samples
+from .arrays import copy, fill, last_before
+from .bodies import stored_energy
+from .compiling import kernel, releases_lock, routine
+from .constraints import constraint_values, note_friction
+from .error import note_forces
+from .factor import factor_bodies
+from .linear import SINGULAR_PART, orient
+from .metric import mass_norm
+from .near import note_crossing
+from .newmark import restart_algorithmic
+from .packed import INDEX_1
+from .projection import project
+from .run_state import BAUMGARTE, ENTERS, ERROR_TEST, FINISHED, LAW_FAILED, PAUSED, PROJECTION
+from .sampled import CHANGED, FAILED, SLACK, control, next_instant
+from .stage import solve_linear
+from .step import attempt, input_power
 
 SAFETY, MIN_FACTOR, MAX_FACTOR = 0.8, 0.2, 2.0
 # Step size after a jump, relative to one in which the jump moves the mechanism by the tolerance.

@@ -2,9 +2,9 @@
 
 from math import sqrt
 
-from paraflex.kernel.bending import second_order_mass_square, second_order_mass_times
-from paraflex.kernel.compiling import inlined, kernel
-from paraflex.kernel.packed import MPF, S2X, S2Y
+from .bending import second_order_mass_square, second_order_mass_times
+from .compiling import inlined, kernel
+from .packed import MPF, S2X, S2Y
 
 
 @inlined

@@ -10,13 +10,13 @@ The step size is kept meanwhile, so that a few steps span the position.
 
 from math import sqrt
 
-from paraflex.kernel import indices as at
-from paraflex.kernel.arrays import add, copy, fill
-from paraflex.kernel.compiling import inlined, routine
-from paraflex.kernel.constraints import constraint_values
-from paraflex.kernel.linear import own_square, solve_system
-from paraflex.kernel.metric import mass_norm
-from paraflex.kernel.projection import NO_VIOLATION, largest_violation, least_change
+from . import indices as at
+from .arrays import add, copy, fill
+from .compiling import inlined, routine
+from .constraints import constraint_values
+from .linear import own_square, solve_system
+from .metric import mass_norm
+from .projection import NO_VIOLATION, largest_violation, least_change
 
 # A run is near a singular position if it could reach it within this many steps, or if the root is less than this part
 # of its largest value so far; in either case only if the relative pivot is less than this part of its largest value.

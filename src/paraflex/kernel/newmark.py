@@ -9,12 +9,12 @@ is adjusted if h changes. Wilson's method assumes a linear acceleration up to t 
 there, and projects its result at t + h onto the constraints and their two derivatives.
 """
 
-from paraflex.kernel import indices as at
-from paraflex.kernel.arrays import add, copy
-from paraflex.kernel.compiling import routine
-from paraflex.kernel.packed import CONSTRAINT, INDEX_1
-from paraflex.kernel.projection import least_change, project
-from paraflex.kernel.stage import equations
+from . import indices as at
+from .arrays import add, copy
+from .compiling import routine
+from .packed import CONSTRAINT, INDEX_1
+from .projection import least_change, project
+from .stage import equations
 
 
 @routine

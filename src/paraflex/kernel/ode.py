@@ -3,15 +3,15 @@
 A third part is added to (q, v), the work done so far, so that a solver integrates the power with the motion.
 """
 
-from paraflex.kernel.arrays import copy, fill
-from paraflex.kernel.compiling import kernel, routine
-from paraflex.kernel.constraints import constraint_values, note_friction
-from paraflex.kernel.factor import factor_bodies
-from paraflex.kernel.linear import orient, solve_residuals
-from paraflex.kernel.packed import CONSTRAINT, INDEX_1
-from paraflex.kernel.stage import equations, solve_linear
-from paraflex.kernel.step import input_power
-from paraflex.kernel.tangent import note_slopes, reaction_tangent, residual_tangent
+from .arrays import copy, fill
+from .compiling import kernel, routine
+from .constraints import constraint_values, note_friction
+from .factor import factor_bodies
+from .linear import orient, solve_residuals
+from .packed import CONSTRAINT, INDEX_1
+from .stage import equations, solve_linear
+from .step import input_power
+from .tangent import note_slopes, reaction_tangent, residual_tangent
 
 # Value of b for rows of springs and dampers that determine their forces independently of the accelerations: the rows
 # are divided by b or by its square root, and both must be negligible beside 1.

@@ -11,9 +11,9 @@ from typing import Annotated, NamedTuple
 import numpy as np
 
 from paraflex.arrays import Array, Indices, Records
-from paraflex.kernel.arrays import Floats, allocated, apart
-from paraflex.kernel.compiling import by_reference
-from paraflex.kernel.vectors import padded
+from .arrays import Floats, allocated, apart
+from .compiling import by_reference
+from .vectors import padded
 
 # Rows of PackedSystem.modal.
 S2X, S2Y, I1, GJ, OMEGA2, DAMPING = range(6)

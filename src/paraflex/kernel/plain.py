@@ -16,7 +16,7 @@ import llvmlite
 import numba
 import numpy as np
 
-from paraflex.kernel.notice import LOG
+from .notice import LOG
 
 VARIABLE = "PARAFLEX_PLAIN_NUMBA"
 # First and last release that the changes are tested with; with earlier releases no kernel compiles.

@@ -4,10 +4,10 @@ The metric is M + b K, the mass matrix and the stiffness as seen by a step of g^
 1997). With the mass matrix alone a correction would excite the stiffest modes.
 """
 
-from paraflex.kernel.arrays import add, fill
-from paraflex.kernel.compiling import routine
-from paraflex.kernel.constraints import constraint_values
-from paraflex.kernel.linear import solve_system
+from .arrays import add, fill
+from .compiling import routine
+from .constraints import constraint_values
+from .linear import solve_system
 
 # Smaller violations, in units of their rows, count as zero; the factor is that of the step's start, so each pass
 # leaves a small part.

@@ -2,19 +2,19 @@
 
 from typing import Annotated, NamedTuple
 
-from paraflex.kernel import indices as at, samples
-from paraflex.kernel.arrays import Floats, Ints, add, copy, largest
-from paraflex.kernel.bending import note_all_axial_forces
-from paraflex.kernel.bodies import stored_energy, weight_work
-from paraflex.kernel.compiling import by_reference, inlined, kernel, releases_lock, routine
-from paraflex.kernel.constraints import note_friction
-from paraflex.kernel.factor import factor_bodies
-from paraflex.kernel.krylov import exact_correction
-from paraflex.kernel.linear import orient, solve_residuals
-from paraflex.kernel.packed import INDEX_1
-from paraflex.kernel.stage import equations, note_torques, place
-from paraflex.kernel.step import baumgarte_gains, input_power, stage_start
-from paraflex.kernel.tangent import note_slopes
+from . import indices as at, samples
+from .arrays import Floats, Ints, add, copy, largest
+from .bending import note_all_axial_forces
+from .bodies import stored_energy, weight_work
+from .compiling import by_reference, inlined, kernel, releases_lock, routine
+from .constraints import note_friction
+from .factor import factor_bodies
+from .krylov import exact_correction
+from .linear import orient, solve_residuals
+from .packed import INDEX_1
+from .stage import equations, note_torques, place
+from .step import baumgarte_gains, input_power, stage_start
+from .tangent import note_slopes
 
 # Corrections end if the next one is expected below the first bound, relative to the corrected values, or if they no
 # longer decrease below the second bound; the third is the ratio from which on they count as not decreasing.

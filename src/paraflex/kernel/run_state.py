@@ -3,8 +3,8 @@
 from typing import Annotated, NamedTuple
 
 from paraflex.arrays import Array, Indices, Mask
-from paraflex.kernel.arrays import Floats, Ints, allocated
-from paraflex.kernel.compiling import by_reference
+from .arrays import Floats, Ints, allocated
+from .compiling import by_reference
 
 # Largest number of singular positions recorded in a run.
 MOST_PASSAGES = 1000

@@ -16,8 +16,8 @@ from numba import types
 from numba.core import cgutils
 from numba.extending import intrinsic
 
-from paraflex.kernel.arrays import Floats, Ints, allocated, copy, fill
-from paraflex.kernel.compiling import by_reference, routine
+from .arrays import Floats, Ints, allocated, copy, fill
+from .compiling import by_reference, routine
 
 # Indices of SampledLaw.counts: number of the next sample, number of the next torques to act, whole periods of delay,
 # error of the next sample (0, NOT_FINITE or RAISED), address of a compiled function.

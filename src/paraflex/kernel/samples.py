@@ -4,19 +4,19 @@ from math import isfinite
 
 import numpy as np
 
-from paraflex.kernel import indices as at
-from paraflex.kernel.arrays import add, copy, fill, largest
-from paraflex.kernel.bending import note_all_axial_forces
-from paraflex.kernel.bodies import stored_energy
-from paraflex.kernel.compiling import inlined, routine
-from paraflex.kernel.constraints import note_friction
-from paraflex.kernel.factor import factor_bodies
-from paraflex.kernel.linear import SINGULAR_PART, orient, solve_residuals
-from paraflex.kernel.metric import mass_norm
-from paraflex.kernel.packed import INDEX_1
-from paraflex.kernel.run_state import BAUMGARTE
-from paraflex.kernel.stage import ROUNDING, WORST_CONTRACTION, largest_part, note_torques, place, residuals
-from paraflex.kernel.step import constraint_weights, input_power
+from . import indices as at
+from .arrays import add, copy, fill, largest
+from .bending import note_all_axial_forces
+from .bodies import stored_energy
+from .compiling import inlined, routine
+from .constraints import note_friction
+from .factor import factor_bodies
+from .linear import SINGULAR_PART, orient, solve_residuals
+from .metric import mass_norm
+from .packed import INDEX_1
+from .run_state import BAUMGARTE
+from .stage import ROUNDING, WORST_CONTRACTION, largest_part, note_torques, place, residuals
+from .step import constraint_weights, input_power
 
 # A sample within this part of a step before its end is at its end.
 SAME_TIME = 1e-9

@@ -14,15 +14,15 @@ solved with the iteration matrix of a run, rotated to the pose of each stage, un
 
 import numpy as np
 
-from paraflex.kernel import rounding
-from paraflex.kernel.arrays import add, apart, copy, fill
-from paraflex.kernel.compiling import releases_lock, routine
-from paraflex.kernel.constraints import note_friction
-from paraflex.kernel.krylov import exact_correction
-from paraflex.kernel.linear import solve_residuals
-from paraflex.kernel.packed import Signals
-from paraflex.kernel.samples import is_long
-from paraflex.kernel.sensitivity_samples import (
+from . import rounding
+from .arrays import add, apart, copy, fill
+from .compiling import releases_lock, routine
+from .constraints import note_friction
+from .krylov import exact_correction
+from .linear import solve_residuals
+from .packed import Signals
+from .samples import is_long
+from .sensitivity_samples import (
     DIFFERENCE_STEP,
     PLACES,
     WEIGHTS,
@@ -30,10 +30,10 @@ from paraflex.kernel.sensitivity_samples import (
     velocity_along_curve,
     work_sensitivity,
 )
-from paraflex.kernel.signals import piece_at
-from paraflex.kernel.stage import equations, note_torques
-from paraflex.kernel.step import input_power
-from paraflex.kernel.tangent import note_slopes, residual_tangent
+from .signals import piece_at
+from .stage import equations, note_torques
+from .step import input_power
+from .tangent import note_slopes, residual_tangent
 
 # Points of the difference from the outside in, so that small terms are added first.
 OUTSIDE_IN = (0, 3, 1, 2)

@@ -3,9 +3,9 @@
 from typing import Annotated, NamedTuple
 
 from paraflex.arrays import Array
-from paraflex.kernel.arrays import Floats, Ints, fill
-from paraflex.kernel.compiling import by_reference, inlined, routine
-from paraflex.kernel.samples import differentiate_nodes, interpolate, node_slope, node_value, work_weight
+from .arrays import Floats, Ints, fill
+from .compiling import by_reference, inlined, routine
+from .samples import differentiate_nodes, interpolate, node_slope, node_value, work_weight
 
 # Step of central differences of fourth order, as a part of a parameter's size, and their points and weights.
 DIFFERENCE_STEP = 1e-3

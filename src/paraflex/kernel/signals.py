@@ -1,7 +1,7 @@
 """Time profiles as piecewise quintics, evaluated exactly with their derivatives."""
 
-from paraflex.kernel.arrays import last_before
-from paraflex.kernel.compiling import inlined, kernel
+from .arrays import last_before
+from .compiling import inlined, kernel
 
 
 @inlined

@@ -14,19 +14,19 @@ size.
 
 from math import isfinite
 
-from paraflex.kernel import joints
-from paraflex.kernel.arrays import add, largest
-from paraflex.kernel.axes import apply_axes
-from paraflex.kernel.bodies import begin_body
-from paraflex.kernel.compiling import inlined, routine, unoptimised
-from paraflex.kernel.constraints import constraint_values
-from paraflex.kernel.factor import factor_bodies
-from paraflex.kernel.linear import SINGULAR_PART, orient, right_hand_side, solve_residuals, solve_system
-from paraflex.kernel.metric import mass_norm
-from paraflex.kernel.near import hold_rows
-from paraflex.kernel.projection import least_change
-from paraflex.kernel.signals import evaluate_signal
-from paraflex.kernel.sums import hand_on
+from . import joints
+from .arrays import add, largest
+from .axes import apply_axes
+from .bodies import begin_body
+from .compiling import inlined, routine, unoptimised
+from .constraints import constraint_values
+from .factor import factor_bodies
+from .linear import SINGULAR_PART, orient, right_hand_side, solve_residuals, solve_system
+from .metric import mass_norm
+from .near import hold_rows
+from .projection import least_change
+from .signals import evaluate_signal
+from .sums import hand_on
 
 MAX_ITERATIONS, NEAR_ITERATIONS = 8, 24
 # SLOW: the iteration still contracts after the largest number of iterations.

@@ -7,28 +7,21 @@ the first of the next step. The Newmark family takes its only stage from `kernel
 
 from math import isfinite
 
-from paraflex.kernel import indices as at, near
-from paraflex.kernel.arrays import copy, fill, largest
-from paraflex.kernel.axes import axis_power
-from paraflex.kernel.bending import note_all_axial_forces
-from paraflex.kernel.compiling import routine
-from paraflex.kernel.constraints import dissipated_power, note_friction
-from paraflex.kernel.error import (
-    allowed_part,
-    embedded_error,
-    filtered_error,
-    force_error,
-    history_error,
-    note_lost_vibrations,
-)
-from paraflex.kernel.factor import factor_bodies
-from paraflex.kernel.joints import line_energy, load_power, marker_angle, modal_damping_power
-from paraflex.kernel.linear import SINGULAR_PART, orient
-from paraflex.kernel.newmark import newmark_end, newmark_start
-from paraflex.kernel.packed import INDEX_1
-from paraflex.kernel.run_state import ENTERS, GGL, NO_CONVERGENCE, NOT_FINITE, PAUSED, POSITION, PROJECTION
-from paraflex.kernel.signals import evaluate_signal
-from paraflex.kernel.stage import CONVERGED, SINGULAR, SLOW, WORST_CONTRACTION, place, solve_stage
+from . import indices as at, near
+from .arrays import copy, fill, largest
+from .axes import axis_power
+from .bending import note_all_axial_forces
+from .compiling import routine
+from .constraints import dissipated_power, note_friction
+from .error import allowed_part, embedded_error, filtered_error, force_error, history_error, note_lost_vibrations
+from .factor import factor_bodies
+from .joints import line_energy, load_power, marker_angle, modal_damping_power
+from .linear import SINGULAR_PART, orient
+from .newmark import newmark_end, newmark_start
+from .packed import INDEX_1
+from .run_state import ENTERS, GGL, NO_CONVERGENCE, NOT_FINITE, PAUSED, POSITION, PROJECTION
+from .signals import evaluate_signal
+from .stage import CONVERGED, SINGULAR, SLOW, WORST_CONTRACTION, place, solve_stage
 
 # A new factor costs about as much as this many iterations, so it pays once the old one has cost as many more. In
 # second-order geometry it costs more.

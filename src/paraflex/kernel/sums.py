@@ -8,8 +8,8 @@ coordinates in a second pass.
 
 from math import cos, sin
 
-from paraflex.kernel.compiling import inlined
-from paraflex.kernel.vectors import LANES, add_product, add_scaled, load, store, summed, zeros
+from .compiling import inlined
+from .vectors import LANES, add_product, add_scaled, load, store, summed, zeros
 
 # The first columns of a body; its markers follow with three columns each: x, y and slope.
 S2X_SUM, S2Y_SUM, I1_SUM, GJ_SUM = range(4)

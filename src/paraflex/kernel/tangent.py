@@ -10,14 +10,14 @@ from math import cosh, sqrt
 from typing import Annotated, NamedTuple
 
 from paraflex.arrays import Array
-from paraflex.kernel.arrays import Floats, allocated, apart, fill
-from paraflex.kernel.compiling import by_reference, inlined, kernel, routine
-from paraflex.kernel.constraints import joint_rates
-from paraflex.kernel.joints import apply_torque, end_motion, load_at, marker_angles, marker_motion, row_part
-from paraflex.kernel.packed import ANGLE, AXIS, CONSTRAINT, FRICTION, PackedSystem, sizes_of
-from paraflex.kernel.tangent_axes import axes_tangent
-from paraflex.kernel.tangent_bodies import body_terms_tangent
-from paraflex.kernel.tangent_points import end_tangent, force_tangent, marker_tangent
+from .arrays import Floats, allocated, apart, fill
+from .compiling import by_reference, inlined, kernel, routine
+from .constraints import joint_rates
+from .joints import apply_torque, end_motion, load_at, marker_angles, marker_motion, row_part
+from .packed import ANGLE, AXIS, CONSTRAINT, FRICTION, PackedSystem, sizes_of
+from .tangent_axes import axes_tangent
+from .tangent_bodies import body_terms_tangent
+from .tangent_points import end_tangent, force_tangent, marker_tangent
 
 
 @by_reference

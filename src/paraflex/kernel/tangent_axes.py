@@ -2,10 +2,10 @@
 
 from math import cos, sin
 
-from paraflex.kernel.axes import axis_frame, component, line_turn, track_deflection, track_piece, track_row
-from paraflex.kernel.compiling import inlined, routine
-from paraflex.kernel.joints import apply_torque, marker_angles, row_part
-from paraflex.kernel.tangent_points import end_tangent, force_tangent
+from .axes import axis_frame, component, line_turn, track_deflection, track_piece, track_row
+from .compiling import inlined, routine
+from .joints import apply_torque, marker_angles, row_part
+from .tangent_points import end_tangent, force_tangent
 
 
 @inlined

@@ -1,8 +1,8 @@
 """Changes of the terms of one body along a direction, for both geometries: see `kernel.tangent`."""
 
-from paraflex.kernel.compiling import inlined, routine
-from paraflex.kernel.packed import DAMPING, GJ, I1, OMEGA2, S2X, S2Y
-from paraflex.kernel.tangent_points import rotated_tangent, turned_axes
+from .compiling import inlined, routine
+from .packed import DAMPING, GJ, I1, OMEGA2, S2X, S2Y
+from .tangent_points import rotated_tangent, turned_axes
 
 # Rows of Tangent.points: slopes at the Gauss points, their two derivatives, the axial force there; and changes of
 # these.

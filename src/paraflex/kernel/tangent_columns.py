@@ -1,8 +1,8 @@
 """Columns of the tangent matrices of the equations of motion, computed together for bodies that are not connected."""
 
-from paraflex.kernel.arrays import copy, fill
-from paraflex.kernel.compiling import kernel
-from paraflex.kernel.tangent import residual_tangent
+from .arrays import copy, fill
+from .compiling import kernel
+from .tangent import residual_tangent
 
 # Part of the motion that changes: accelerations, velocities or coordinates.
 ACCELERATION, VELOCITY, COORDINATE = range(3)

@@ -2,9 +2,9 @@
 
 from math import cos, sin
 
-from paraflex.kernel.compiling import inlined, routine
-from paraflex.kernel.joints import marker_shape, marker_shapes, relative_motion
-from paraflex.kernel.packed import NX, NY
+from .compiling import inlined, routine
+from .joints import marker_shape, marker_shapes, relative_motion
+from .packed import NX, NY
 
 
 @inlined

@@ -12,7 +12,7 @@ from numba import types
 from numba.core import cgutils
 from numba.extending import intrinsic, models, register_jitable, register_model
 
-from paraflex.kernel.compiling import FAST_MATH
+from .compiling import FAST_MATH
 
 LANES = 8
 # Numba supplies the first argument of an intrinsic; type checkers do not know that.

@@ -1,6 +1,6 @@
 """Paths of the end-effector, and the joint motion that follows them."""
 
-from paraflex.kinematics.closure import (
+from .closure import (
     PathFollower as PathFollower,
     RigidMotion as RigidMotion,
     follow_path as follow_path,
@@ -8,8 +8,8 @@ from paraflex.kinematics.closure import (
     pose_at as pose_at,
     reach_shortfall as reach_shortfall,
 )
-from paraflex.kinematics.model import ModelWithPaths as ModelWithPaths
-from paraflex.kinematics.paths import (
+from .model import ModelWithPaths as ModelWithPaths
+from .paths import (
     Circle as Circle,
     Line as Line,
     Path as Path,
@@ -21,5 +21,5 @@ from paraflex.kinematics.paths import (
     length_fraction as length_fraction,
     turning_of as turning_of,
 )
-from paraflex.kinematics.profiles import CruiseProfile as CruiseProfile, TrapezoidalProfile as TrapezoidalProfile
-from paraflex.kinematics.reach import Shortfall as Shortfall
+from .profiles import CruiseProfile as CruiseProfile, TrapezoidalProfile as TrapezoidalProfile
+from .reach import Shortfall as Shortfall

@@ -23,12 +23,12 @@ from paraflex.errors import AssemblyError, InputError, Moment, NumericalError, U
 from paraflex.kernel.arrays import apart
 from paraflex.kernel.closure import LOOPS_CLOSED, LOOPS_SINGULAR, close_path, make_closure_scratch, task_values
 from paraflex.kernel.packed import MARKER, PackedSystem, Signals
-from paraflex.kinematics.paths import KnownPath, Path, PathMotion, turning_of
-from paraflex.kinematics.reach import PoseSearch, Shortfall
 from paraflex.limits import INSTANTS, solvable
 from paraflex.mechanism import Assembly, Mechanism, PointRef, with_actuators
 from paraflex.mechanism.members import TASK_COORDINATES
 from paraflex.mechanism.poses import local_points
+from .paths import KnownPath, Path, PathMotion, turning_of
+from .reach import PoseSearch, Shortfall
 
 # Closure proceeds along the path in steps no longer than this [s], for any requested times.
 _LONGEST_STEP = 1e-3

@@ -2,8 +2,8 @@
 
 from typing import Protocol
 
-from paraflex.kinematics.paths import Path
 from paraflex.mechanism import Mechanism, Start
+from .paths import Path
 
 
 class ModelWithPaths(Protocol):

@@ -13,9 +13,9 @@ import scipy
 from paraflex.arguments import CheckedFields, checked_arguments, named_in_errors
 from paraflex.arrays import Array, Numbers
 from paraflex.errors import InputError
-from paraflex.kinematics.profiles import CruiseProfile, TrapezoidalProfile
 from paraflex.limits import PATH_POINTS, at_most
 from paraflex.mechanism.quantities import check_numbers, field_metadata, finite, not_negative, optional, positive
+from .profiles import CruiseProfile, TrapezoidalProfile
 
 # Number of Gauss points for the length between two knots of a path, or two points of a curve.
 _LENGTH_POINTS = 40

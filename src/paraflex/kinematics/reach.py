@@ -7,8 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from paraflex.arrays import Array, Indices, Mask
-from paraflex.dynamics import System
-from paraflex.dynamics.joint_coordinates import material_angle
+from paraflex.dynamics import System, material_angle
 from paraflex.dynamics.points import marker_place
 from paraflex.dynamics.projection import LeastChange, assemble, closed, shortened
 from paraflex.kernel.packed import Signals

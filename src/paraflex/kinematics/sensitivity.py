@@ -10,7 +10,7 @@ from paraflex.kernel.arrays import apart
 from paraflex.kernel.closure import make_closure_scratch
 from paraflex.kernel.closure_residuals import closure_residuals
 from paraflex.kernel.packed import PackedSystem, Signals
-from paraflex.kinematics.closure import PathClosure, RigidMotion
+from .closure import PathClosure, RigidMotion
 
 
 class DisplacedClosure(NamedTuple):

@@ -11,14 +11,14 @@ from paraflex.dynamics import State
 from paraflex.dynamics.points import marker_position
 from paraflex.errors import InputError
 from paraflex.limits import solvable
-from paraflex.linear.coordinates import FirstCoordinates
-from paraflex.linear.linearise import motion_variables
-from paraflex.linear.model import LinearModel
-from paraflex.linear.points import resting_point
-from paraflex.linear.varying import in_common_coordinates
 from paraflex.mechanism import ActuationMode
 from paraflex.motion import MotionRun
 from paraflex.tracking import TrackingRun, TrackingTask, undeformed_at
+from .coordinates import FirstCoordinates
+from .linearise import motion_variables
+from .model import LinearModel
+from .points import resting_point
+from .varying import in_common_coordinates
 
 
 @dataclass(frozen=True)

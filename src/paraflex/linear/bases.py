@@ -13,7 +13,7 @@ import scipy
 
 from paraflex.arrays import Array
 from paraflex.dynamics.linearise import undamped_modes
-from paraflex.linear.independent import DEPENDENT, successive, unit_rows
+from .independent import DEPENDENT, successive, unit_rows
 
 
 class Basis(NamedTuple):

@@ -6,7 +6,7 @@ import numpy as np
 import scipy
 
 from paraflex.arrays import Array, Complex
-from paraflex.linear.model import LinearModel
+from .model import LinearModel
 
 # Number of candidate poles relative to that of branches: other poles may move between those of the branches.
 _CANDIDATES = 3

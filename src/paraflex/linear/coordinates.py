@@ -25,10 +25,10 @@ from paraflex.dynamics.points import marker_place
 from paraflex.dynamics.system import with_constraints_of
 from paraflex.dynamics.tangents import MotionPoint, Tangency, Tangents, rows_of
 from paraflex.errors import InputError
-from paraflex.linear.independent import independent_dense, independent_sparse
 from paraflex.mechanism import GROUND, ConstantSpeed, Mechanism, PointRef, PrescribedAngle, RevoluteJoint
 from paraflex.mechanism.cut import Cut
 from paraflex.mechanism.quantities import all_listed
+from .independent import independent_dense, independent_sparse
 
 # Largest matrix for dense factorisation: BLAS uses a single thread for it.
 _FEW_ENTRIES = 8192

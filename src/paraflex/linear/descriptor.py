@@ -21,7 +21,7 @@ from scipy.sparse import csr_matrix
 from paraflex.arrays import Array, Complex, Indices, Numbers
 from paraflex.dynamics.sensors import SensorRows
 from paraflex.dynamics.sparse import Factor
-from paraflex.linear.minimal import MinimalEquations
+from .minimal import MinimalEquations
 
 # Seed of the starting vector of Arnoldi's method.
 _SEED = 0

@@ -21,9 +21,9 @@ from scipy.interpolate import make_interp_spline
 from paraflex.arguments import checked_arguments
 from paraflex.arrays import Array
 from paraflex.errors import InputError
-from paraflex.linear.coordinates import Variable
-from paraflex.linear.named import labelled, matrices_of
 from paraflex.mechanism.quantities import known
+from .coordinates import Variable
+from .named import labelled, matrices_of
 
 if TYPE_CHECKING:
     import xarray as xr

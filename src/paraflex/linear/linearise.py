@@ -13,30 +13,21 @@ from scipy.sparse import csr_matrix
 
 from paraflex.arguments import checked_arguments
 from paraflex.arrays import Array
-from paraflex.dynamics import State, System, pose_at_rest, standing_system, static_equilibrium
+from paraflex.dynamics import State, System, pose_at_rest, sensor_rows, standing_system, static_equilibrium
 from paraflex.dynamics.points import marker_place
-from paraflex.dynamics.sensors import sensor_rows
 from paraflex.dynamics.tangents import MotionPoint
 from paraflex.errors import InputError, as_enum
 from paraflex.kinematics import ModelWithPaths
 from paraflex.limits import solvable
-from paraflex.linear.coordinates import CoordinateChoice, Coordinates, FirstCoordinates, Variable, coordinates_of
-from paraflex.linear.minimal import MinimalEquations
-from paraflex.linear.model import LinearModel
-from paraflex.linear.points import planned_point, resting_point, run_point
-from paraflex.mechanism import (
-    ActuationMode,
-    Mechanism,
-    PointRef,
-    Sensor,
-    Start,
-    in_frames,
-    parse_mode,
-)
+from paraflex.mechanism import ActuationMode, Mechanism, PointRef, Sensor, Start, in_frames, parse_mode
 from paraflex.mechanism.checks import known_point
 from paraflex.mechanism.measured import measured_sensors
 from paraflex.motion import MotionRun
 from paraflex.tracking import TrackingRun, TrackingTask
+from .coordinates import CoordinateChoice, Coordinates, FirstCoordinates, Variable, coordinates_of
+from .minimal import MinimalEquations
+from .model import LinearModel
+from .points import planned_point, resting_point, run_point
 
 # Largest distance of a time from the nearest sample, relative to the largest spacing of samples.
 _NEAR = 0.5

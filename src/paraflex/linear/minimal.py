@@ -26,7 +26,7 @@ from paraflex.dynamics import System
 from paraflex.dynamics.sparse import Factor
 from paraflex.dynamics.tangents import MotionPoint
 from paraflex.errors import Moment, SingularPositionError
-from paraflex.linear.coordinates import CoordinateChoice, PointTangents, RowTangents
+from .coordinates import CoordinateChoice, PointTangents, RowTangents
 
 # Coordinates with a larger condition number are singular.
 _SINGULAR = 1e13

@@ -11,19 +11,18 @@ from scipy.sparse import csr_matrix
 
 from paraflex.arguments import checked_arguments
 from paraflex.arrays import Array, Complex, Indices
-from paraflex.dynamics.joint_coordinates import joint_coordinate
+from paraflex.dynamics import SensorRows, joint_coordinate
 from paraflex.dynamics.linearise import slowest, typical_square, undamped_modes
-from paraflex.dynamics.sensors import SensorRows
 from paraflex.dynamics.sparse import stiffness_diagonal
 from paraflex.dynamics.state_space import StateSpace
-from paraflex.linear.bases import kernel
-from paraflex.linear.coordinates import Variable, numbers_of
-from paraflex.linear.descriptor import poles_near, response_at
-from paraflex.linear.minimal import MinimalEquations
-from paraflex.linear.motions import Motions, SecondOrder, driven_equations, modal_damping, motions
-from paraflex.linear.named import NamedModel
-from paraflex.linear.zeros import Vibrating, by_size, vibrating_zeros, zeros
 from paraflex.mechanism.quantities import all_listed
+from .bases import kernel
+from .coordinates import Variable, numbers_of
+from .descriptor import poles_near, response_at
+from .minimal import MinimalEquations
+from .motions import Motions, SecondOrder, driven_equations, modal_damping, motions
+from .named import NamedModel
+from .zeros import Vibrating, by_size, vibrating_zeros, zeros
 
 # Admissible relative asymmetry of a stiffness matrix that is regarded as symmetric.
 _SYMMETRIC = 1e-7

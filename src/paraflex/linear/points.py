@@ -5,16 +5,15 @@ from __future__ import annotations
 import numpy as np
 
 from paraflex.arrays import Array
-from paraflex.dynamics import State, System, joint_coordinate
+from paraflex.dynamics import State, System, acting_loads, joint_coordinate
 from paraflex.dynamics.linearise import forces_at_rest
-from paraflex.dynamics.signals import acting_loads
 from paraflex.dynamics.sparse import sparse_jacobian
 from paraflex.dynamics.stiffness import RestingForces
 from paraflex.dynamics.tangents import MotionPoint
-from paraflex.linear.coordinates import Coordinates
 from paraflex.mechanism import ActuationMode
 from paraflex.motion import MotionRun
 from paraflex.tracking import TrackingRun, TrackingTask, undeformed_at
+from .coordinates import Coordinates
 
 
 def resting_point(coordinates: Coordinates, state: State, mode: ActuationMode) -> tuple[MotionPoint, float]:

@@ -12,12 +12,12 @@ from paraflex.arguments import checked_arguments
 from paraflex.arrays import Array, ArrayLike, Complex
 from paraflex.dynamics.state_space import StateSpace
 from paraflex.errors import InputError
-from paraflex.linear.bases import kernel
-from paraflex.linear.coordinates import Variable, numbers_of
-from paraflex.linear.model import LinearModel
-from paraflex.linear.motions import motions
-from paraflex.linear.named import NamedModel
-from paraflex.linear.zeros import by_size, zeros
+from .bases import kernel
+from .coordinates import Variable, numbers_of
+from .model import LinearModel
+from .motions import motions
+from .named import NamedModel
+from .zeros import by_size, zeros
 
 
 class ReductionMethod(Enum):

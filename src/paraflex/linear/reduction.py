@@ -14,16 +14,16 @@ from paraflex.dynamics.state_space import StateSpace
 from paraflex.errors import InputError, as_enum
 from paraflex.kinematics import ModelWithPaths
 from paraflex.limits import solvable
-from paraflex.linear.balancing import balanced as balanced_truncation
-from paraflex.linear.bases import Basis, carried, craig_bampton, independent_rows, interpolated, lowest_modes, rubin
-from paraflex.linear.coordinates import Variable
-from paraflex.linear.linearise import linear_model, linearise, operating_point
-from paraflex.linear.model import LinearModel
-from paraflex.linear.reduced import ReducedModel, ReductionMethod
-from paraflex.linear.varying import describes, same_bodies
 from paraflex.mechanism import ActuationMode, Mechanism, Start
 from paraflex.motion import MotionRun
 from paraflex.tracking import TrackingRun, TrackingTask
+from .balancing import balanced as balanced_truncation
+from .bases import Basis, carried, craig_bampton, independent_rows, interpolated, lowest_modes, rubin
+from .coordinates import Variable
+from .linearise import linear_model, linearise, operating_point
+from .model import LinearModel
+from .reduced import ReducedModel, ReductionMethod
+from .varying import describes, same_bodies
 
 # Default number of states of reduced models.
 _STATES = 16

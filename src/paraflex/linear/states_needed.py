@@ -10,9 +10,9 @@ import numpy as np
 from paraflex.arguments import checked_arguments
 from paraflex.arrays import Array, Numbers
 from paraflex.errors import InputError, as_enum
-from paraflex.linear.model import LinearModel
-from paraflex.linear.reduced import ReductionMethod
-from paraflex.linear.reduction import reduce
+from .model import LinearModel
+from .reduced import ReductionMethod
+from .reduction import reduce
 
 if TYPE_CHECKING:
     import xarray as xr

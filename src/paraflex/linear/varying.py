@@ -24,15 +24,15 @@ from paraflex.dynamics import System, sensor_readings
 from paraflex.dynamics.tangents import MotionPoint
 from paraflex.errors import InputError, Moment, SingularPositionError, as_enum
 from paraflex.limits import solvable
-from paraflex.linear.coordinates import CoordinateChoice, Coordinates, FirstCoordinates, Variable
-from paraflex.linear.discrete import InputHold, Prediction, SampledModel, transitions
-from paraflex.linear.linearise import ModelVariables, Ports, linear_model, motion_variables, moving, nearest_sample
-from paraflex.linear.minimal import MinimalEquations
-from paraflex.linear.model import LinearModel
-from paraflex.linear.named import labelled, matrices_of
 from paraflex.mechanism import ActuationMode
 from paraflex.motion import MotionRun
 from paraflex.tracking import TrackingRun, TrackingTask
+from .coordinates import CoordinateChoice, Coordinates, FirstCoordinates, Variable
+from .discrete import InputHold, Prediction, SampledModel, transitions
+from .linearise import ModelVariables, Ports, linear_model, motion_variables, moving, nearest_sample
+from .minimal import MinimalEquations
+from .model import LinearModel
+from .named import labelled, matrices_of
 
 if TYPE_CHECKING:
     import xarray as xr

@@ -19,7 +19,7 @@ import scipy
 from paraflex.arrays import Array, Complex, Numbers
 from paraflex.dynamics.state_space import StateSpace
 from paraflex.limits import solvable
-from paraflex.linear.independent import sizes, unit_rows
+from .independent import sizes, unit_rows
 
 # Relative difference of zeros of two squared systems that are regarded as equal.
 _SAME = 1e-6

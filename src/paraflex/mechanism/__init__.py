@@ -1,13 +1,9 @@
 """Immutable descriptions of bodies, joints, motors and the mechanism that they form."""
 
 from paraflex.fem import Polynomial as Polynomial, ShapeFunction as ShapeFunction, Sine as Sine
-from paraflex.mechanism.actuation_modes import (
-    mode_of_motors as mode_of_motors,
-    mode_of_signs as mode_of_signs,
-    parse_mode as parse_mode,
-)
-from paraflex.mechanism.actuators import Actuator as Actuator, Amplifier as Amplifier
-from paraflex.mechanism.bodies import (
+from .actuation_modes import mode_of_motors as mode_of_motors, mode_of_signs as mode_of_signs, parse_mode as parse_mode
+from .actuators import Actuator as Actuator, Amplifier as Amplifier
+from .bodies import (
     AssumedModesBeam as AssumedModesBeam,
     Body as Body,
     ComponentModes as ComponentModes,
@@ -18,17 +14,17 @@ from paraflex.mechanism.bodies import (
     RigidBody as RigidBody,
     given_shapes as given_shapes,
 )
-from paraflex.mechanism.damping import (
+from .damping import (
     Damping as Damping,
     LossFactor as LossFactor,
     ModalDamping as ModalDamping,
     RayleighDamping as RayleighDamping,
     stiffness_proportional as stiffness_proportional,
 )
-from paraflex.mechanism.frames import in_frames as in_frames
-from paraflex.mechanism.gears import Gear as Gear, Relation as Relation, SumRelation as SumRelation
-from paraflex.mechanism.groups import Group as Group, grouped as grouped, groups_of as groups_of
-from paraflex.mechanism.joints import (
+from .frames import in_frames as in_frames
+from .gears import Gear as Gear, Relation as Relation, SumRelation as SumRelation
+from .groups import Group as Group, grouped as grouped, groups_of as groups_of
+from .joints import (
     GROUND as GROUND,
     JOINT_KINDS as JOINT_KINDS,
     AtEnd as AtEnd,
@@ -44,7 +40,7 @@ from paraflex.mechanism.joints import (
     WeldJoint as WeldJoint,
     points_named as points_named,
 )
-from paraflex.mechanism.loads import (
+from .loads import (
     AppliedTorque as AppliedTorque,
     JointFriction as JointFriction,
     LinearSpring as LinearSpring,
@@ -53,41 +49,35 @@ from paraflex.mechanism.loads import (
     TorsionalDamper as TorsionalDamper,
     TorsionalSpring as TorsionalSpring,
 )
-from paraflex.mechanism.loops import loops as loops
-from paraflex.mechanism.mechanism import Mechanism as Mechanism
-from paraflex.mechanism.members import (
+from .loops import loops as loops
+from .mechanism import Mechanism as Mechanism
+from .members import (
     ActuationMode as ActuationMode,
     Assembly as Assembly,
     EndEffector as EndEffector,
     Geometry as Geometry,
 )
-from paraflex.mechanism.modal import ModalBody as ModalBody, ModalPoint as ModalPoint
-from paraflex.mechanism.payload import Payload as Payload
-from paraflex.mechanism.poses import Pose as Pose, approximate_poses as approximate_poses, placed_poses as placed_poses
-from paraflex.mechanism.profiles import (
+from .modal import ModalBody as ModalBody, ModalPoint as ModalPoint
+from .payload import Payload as Payload
+from .poses import Pose as Pose, approximate_poses as approximate_poses, placed_poses as placed_poses
+from .profiles import (
     ConstantSpeed as ConstantSpeed,
     PiecewiseProfile as PiecewiseProfile,
     SampledAngle as SampledAngle,
     TabulatedProfile as TabulatedProfile,
     TimeProfile as TimeProfile,
 )
-from paraflex.mechanism.quantities import joints_named as joints_named
-from paraflex.mechanism.raparm import raparm_i as raparm_i
-from paraflex.mechanism.rotors import (
+from .quantities import joints_named as joints_named
+from .raparm import raparm_i as raparm_i
+from .rotors import (
     actuator_motors as actuator_motors,
     actuators_by_motor as actuators_by_motor,
     rotor_mass as rotor_mass,
     with_actuators as with_actuators,
 )
-from paraflex.mechanism.rows import chain_of_segments as chain_of_segments, four_bars_in_a_row as four_bars_in_a_row
-from paraflex.mechanism.sections import (
-    Rectangle as Rectangle,
-    Round as Round,
-    Section as Section,
-    Shape as Shape,
-    Tube as Tube,
-)
-from paraflex.mechanism.segments import (
+from .rows import chain_of_segments as chain_of_segments, four_bars_in_a_row as four_bars_in_a_row
+from .sections import Rectangle as Rectangle, Round as Round, Section as Section, Shape as Shape, Tube as Tube
+from .segments import (
     FIRST_END as FIRST_END,
     LAST_END as LAST_END,
     SegmentedMechanism as SegmentedMechanism,
@@ -96,7 +86,7 @@ from paraflex.mechanism.segments import (
     is_hinge as is_hinge,
     proportional_segments as proportional_segments,
 )
-from paraflex.mechanism.sensors import (
+from .sensors import (
     SENSOR_KINDS as SENSOR_KINDS,
     AccelerationSensor as AccelerationSensor,
     DeflectionSensor as DeflectionSensor,
@@ -109,7 +99,7 @@ from paraflex.mechanism.sensors import (
     Tachometer as Tachometer,
     VelocitySensor as VelocitySensor,
 )
-from paraflex.mechanism.start import (
+from .start import (
     BodyValues as BodyValues,
     Deflection as Deflection,
     Start as Start,

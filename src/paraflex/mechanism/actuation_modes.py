@@ -4,9 +4,9 @@ from collections.abc import Sequence
 
 from paraflex.arguments import checked_arguments
 from paraflex.errors import InputError
-from paraflex.mechanism.mechanism import Mechanism
-from paraflex.mechanism.members import ActuationMode
-from paraflex.mechanism.quantities import known
+from .mechanism import Mechanism
+from .members import ActuationMode
+from .quantities import known
 
 # The paper prints circled signs; some keyboards and many PDFs have these in place of plain ASCII.
 _SIGNS = str.maketrans({"⊕": "+", "⊖": "-", "−": "-", "–": "-"})

@@ -7,7 +7,7 @@ from math import inf, pi, sqrt
 
 from paraflex.arguments import CheckedFields
 from paraflex.errors import InputError
-from paraflex.mechanism.quantities import not_negative, optional, positive
+from .quantities import not_negative, optional, positive
 
 
 class Amplifier(Enum):

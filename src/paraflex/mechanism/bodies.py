@@ -19,10 +19,10 @@ from paraflex.fem import (
     assumed_integrals,
     mesh_beam,
 )
-from paraflex.mechanism.damping import Damping
-from paraflex.mechanism.modal import DAMPING, MODES, DeformableBody, ModalBody
-from paraflex.mechanism.quantities import field_metadata, finite, not_negative, optional, positive
-from paraflex.mechanism.sections import Section
+from .damping import Damping
+from .modal import DAMPING, MODES, DeformableBody, ModalBody
+from .quantities import field_metadata, finite, not_negative, optional, positive
+from .sections import Section
 
 T = TypeVar("T")
 _LENGTH = field_metadata("the length in m", positive)

@@ -6,10 +6,10 @@ from typing import TypeVar
 from paraflex.errors import InputError, within
 from paraflex.fem import Polynomial, mesh_beam
 from paraflex.limits import ELEMENTS
-from paraflex.mechanism.bodies import AssumedModesBeam, Body, ComponentModes, FlexibleBeam, RigidBody
-from paraflex.mechanism.damping import stiffness_damping
-from paraflex.mechanism.modal import ModalBody
-from paraflex.mechanism.quantities import check_numbers, finite, known
+from .bodies import AssumedModesBeam, Body, ComponentModes, FlexibleBeam, RigidBody
+from .damping import stiffness_damping
+from .modal import ModalBody
+from .quantities import check_numbers, finite, known
 
 T = TypeVar("T")
 

@@ -4,15 +4,15 @@ from collections import Counter
 from typing import Any
 
 from paraflex.errors import InputError, suggestion
-from paraflex.mechanism.bodies import FlexibleBeam
-from paraflex.mechanism.body_checks import check_body
-from paraflex.mechanism.groups import Group, grouped, groups_of
-from paraflex.mechanism.joints import GROUND, PointRef, points_named
-from paraflex.mechanism.members import Assembly, Members
-from paraflex.mechanism.poses import approximate_poses, placed_poses
-from paraflex.mechanism.quantities import check_numbers, finite, joints_named, known
-from paraflex.mechanism.rotors import check_actuators
-from paraflex.mechanism.sensors import Sensor
+from .bodies import FlexibleBeam
+from .body_checks import check_body
+from .groups import Group, grouped, groups_of
+from .joints import GROUND, PointRef, points_named
+from .members import Assembly, Members
+from .poses import approximate_poses, placed_poses
+from .quantities import check_numbers, finite, joints_named, known
+from .rotors import check_actuators
+from .sensors import Sensor
 
 
 def check_mechanism(mechanism: Members) -> None:

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
-from paraflex.mechanism.joints import PointRef
+from .joints import PointRef
 
 
 @dataclass(frozen=True)

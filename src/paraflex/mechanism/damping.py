@@ -7,7 +7,7 @@ import numpy as np
 from paraflex.arguments import CheckedFields, named_in_errors
 from paraflex.arrays import Array
 from paraflex.errors import InputError
-from paraflex.mechanism.quantities import field_metadata, not_negative, optional, positive
+from .quantities import field_metadata, not_negative, optional, positive
 
 
 @dataclass(frozen=True)

@@ -10,12 +10,12 @@ from itertools import pairwise
 from typing import Any
 
 from paraflex.errors import InputError
-from paraflex.mechanism.bodies import Body, FlexibleBeam
-from paraflex.mechanism.cut import Cut
-from paraflex.mechanism.joints import PointRef, WeldJoint
-from paraflex.mechanism.mechanism import Mechanism
-from paraflex.mechanism.segments import FIRST_END, LAST_END, moved, rebuilt
-from paraflex.mechanism.sensors import Sensor
+from .bodies import Body, FlexibleBeam
+from .cut import Cut
+from .joints import PointRef, WeldJoint
+from .mechanism import Mechanism
+from .segments import FIRST_END, LAST_END, moved, rebuilt
+from .sensors import Sensor
 
 # Positions closer than this fraction of the beam coincide.
 _SAME = 1e-9

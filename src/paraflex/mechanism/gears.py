@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from paraflex.arguments import CheckedFields
-from paraflex.mechanism.quantities import field_metadata, finite, not_zero, optional
+from .quantities import field_metadata, finite, not_zero, optional
 
 PHASE = field_metadata(
     "the coordinate of the second joint where that of the first is zero in rad, or m; by default that of the "

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field, fields
 from functools import cache
 from typing import Any
 
-from paraflex.mechanism.gears import Relation
+from .gears import Relation
 
 
 @dataclass(frozen=True)

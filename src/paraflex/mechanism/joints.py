@@ -12,8 +12,8 @@ from typing import Any, ClassVar
 
 from paraflex.arguments import CheckedFields, checked_arguments, named_in_errors
 from paraflex.errors import InputError, within
-from paraflex.mechanism.profiles import TimeProfile, check_motion
-from paraflex.mechanism.quantities import AT_JOINT, JointThat, field_metadata, finite, optional, positive
+from .profiles import TimeProfile, check_motion
+from .quantities import AT_JOINT, JointThat, field_metadata, finite, optional, positive
 
 GROUND = "ground"
 

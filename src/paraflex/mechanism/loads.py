@@ -8,9 +8,9 @@ import numpy as np
 from paraflex.arguments import CheckedFields, named_in_errors
 from paraflex.arrays import Array
 from paraflex.errors import within
-from paraflex.mechanism.joints import PointRef
-from paraflex.mechanism.profiles import TimeProfile, marks
-from paraflex.mechanism.quantities import AT_JOINT, field_metadata, finite, not_negative, optional, positive
+from .joints import PointRef
+from .profiles import TimeProfile, marks
+from .quantities import AT_JOINT, field_metadata, finite, not_negative, optional, positive
 
 
 @dataclass(frozen=True)

@@ -2,8 +2,8 @@
 
 from collections import deque
 
-from paraflex.mechanism.joints import GROUND
-from paraflex.mechanism.mechanism import Mechanism
+from .joints import GROUND
+from .mechanism import Mechanism
 
 
 def loops(mechanism: Mechanism) -> list[tuple[str, ...]]:

@@ -2,8 +2,8 @@
 
 from collections.abc import Container
 
-from paraflex.mechanism.mechanism import Mechanism
-from paraflex.mechanism.sensors import Encoder, PositionSensor, Sensor
+from .mechanism import Mechanism
+from .sensors import Encoder, PositionSensor, Sensor
 
 
 def measured_sensors(mechanism: Mechanism) -> tuple[Sensor, ...]:

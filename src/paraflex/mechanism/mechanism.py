@@ -10,13 +10,13 @@ from paraflex.display import Shown
 from paraflex.errors import InputError, as_enum
 from paraflex.fem import ReferenceCondition
 from paraflex.late import save_file
-from paraflex.mechanism.bodies import Body, ComponentModes, Curvature, FlexibleBeam, RigidBody, given_shapes
-from paraflex.mechanism.checks import check_mechanism
-from paraflex.mechanism.members import Geometry, Members
-from paraflex.mechanism.payload import Payload, loaded, together
-from paraflex.mechanism.phases import with_phases
-from paraflex.mechanism.quantities import known
-from paraflex.mechanism.tracks import with_meshes
+from .bodies import Body, ComponentModes, Curvature, FlexibleBeam, RigidBody, given_shapes
+from .checks import check_mechanism
+from .members import Geometry, Members
+from .payload import Payload, loaded, together
+from .phases import with_phases
+from .quantities import known
+from .tracks import with_meshes
 
 
 @named_in_errors("a mechanism", "a Mechanism, or the model that paraflex.load reads")

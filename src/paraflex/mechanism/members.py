@@ -8,24 +8,16 @@ from typing import Self
 
 from paraflex.arguments import CheckedFields, checked_arguments, named_in_errors
 from paraflex.errors import InputError
-from paraflex.mechanism.actuators import Actuator
-from paraflex.mechanism.bodies import Body
-from paraflex.mechanism.cut import Cut
-from paraflex.mechanism.gears import Gear, Relation, SumRelation
-from paraflex.mechanism.groups import Group, group, grouped
-from paraflex.mechanism.joints import GROUND, Joint, Motor, PointRef, PrescribedAngle, points_named
-from paraflex.mechanism.loads import (
-    AppliedTorque,
-    JointFriction,
-    LinearSpring,
-    Load,
-    PointForce,
-    TorsionalDamper,
-    TorsionalSpring,
-)
-from paraflex.mechanism.payload import Payload
-from paraflex.mechanism.quantities import field_metadata, joints_named, known, optional
-from paraflex.mechanism.sensors import SENSOR_KINDS, Sensor
+from .actuators import Actuator
+from .bodies import Body
+from .cut import Cut
+from .gears import Gear, Relation, SumRelation
+from .groups import Group, group, grouped
+from .joints import GROUND, Joint, Motor, PointRef, PrescribedAngle, points_named
+from .loads import AppliedTorque, JointFriction, LinearSpring, Load, PointForce, TorsionalDamper, TorsionalSpring
+from .payload import Payload
+from .quantities import field_metadata, joints_named, known, optional
+from .sensors import SENSOR_KINDS, Sensor
 
 TASK_COORDINATES = ("x", "y", "angle")
 

@@ -10,8 +10,8 @@ from paraflex.arguments import CheckedFields
 from paraflex.errors import InputError
 from paraflex.fem import ShapeIntegrals
 from paraflex.fem.eigen import is_definite
-from paraflex.mechanism.damping import Damping
-from paraflex.mechanism.quantities import field_metadata, optional, positive
+from .damping import Damping
+from .quantities import field_metadata, optional, positive
 
 Row = Sequence[float]
 Matrix = Sequence[Sequence[float]]

@@ -8,9 +8,9 @@ import numpy as np
 
 from paraflex.arguments import CheckedFields, with_fields
 from paraflex.errors import InputError
-from paraflex.mechanism.bodies import Body, LumpedMass, RigidBody
-from paraflex.mechanism.modal import ModalBody
-from paraflex.mechanism.quantities import check_numbers, field_metadata, finite, not_negative, optional
+from .bodies import Body, LumpedMass, RigidBody
+from .modal import ModalBody
+from .quantities import check_numbers, field_metadata, finite, not_negative, optional
 
 
 @dataclass(frozen=True)

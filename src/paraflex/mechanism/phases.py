@@ -6,11 +6,11 @@ from math import cos, dist, sin
 from typing import Any
 
 from paraflex.errors import InputError
-from paraflex.mechanism.groups import Group, groups_of
-from paraflex.mechanism.joints import Joint, PointRef
-from paraflex.mechanism.members import Members
-from paraflex.mechanism.poses import Place, Pose, approximate_poses, local_points, placed_poses
-from paraflex.mechanism.quantities import positive
+from .groups import Group, groups_of
+from .joints import Joint, PointRef
+from .members import Members
+from .poses import Place, Pose, approximate_poses, local_points, placed_poses
+from .quantities import positive
 
 
 def with_phases(mechanism: Members) -> dict[str, tuple[Any, ...]]:

@@ -6,10 +6,10 @@ from math import atan2, cos, hypot, sin
 
 from paraflex.arguments import checked_arguments
 from paraflex.errors import InputError
-from paraflex.mechanism.bodies import Body, RigidBody
-from paraflex.mechanism.joints import GROUND, PointRef
-from paraflex.mechanism.members import Assembly, Members
-from paraflex.mechanism.modal import ModalBody
+from .bodies import Body, RigidBody
+from .joints import GROUND, PointRef
+from .members import Assembly, Members
+from .modal import ModalBody
 
 Place = tuple[float, float]
 # Points of a body closer than this fraction of its size do not determine its angle.

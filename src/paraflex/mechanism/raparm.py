@@ -8,10 +8,10 @@ from math import pi
 
 from paraflex.arguments import checked_arguments
 from paraflex.fem import ReferenceCondition
-from paraflex.mechanism.bodies import Curvature, FlexibleBeam, LumpedMass, Material, Section
-from paraflex.mechanism.joints import Motor, PointRef, RevoluteJoint
-from paraflex.mechanism.mechanism import Mechanism
-from paraflex.mechanism.members import ActuationMode, Assembly, EndEffector, Geometry
+from .bodies import Curvature, FlexibleBeam, LumpedMass, Material, Section
+from .joints import Motor, PointRef, RevoluteJoint
+from .mechanism import Mechanism
+from .members import ActuationMode, Assembly, EndEffector, Geometry
 
 # Table 1: signs of the motors tau1 (A1B1), tau2 (D1E1), tau5 (A2B2), tau6 (D2E2).
 TABLE_1 = ("+-+-", "-+-+", "+--+", "-++-", "+++-", "++-+", "+-++", "-+++", "++++")

@@ -4,14 +4,14 @@ from typing import Any
 
 from paraflex.arguments import with_fields
 from paraflex.errors import InputError
-from paraflex.mechanism.actuators import Actuator
-from paraflex.mechanism.bodies import Body
-from paraflex.mechanism.cut import Cut
-from paraflex.mechanism.joints import Joint, Motor, PointRef
-from paraflex.mechanism.loads import PointForce, TorsionalDamper
-from paraflex.mechanism.members import Members
-from paraflex.mechanism.payload import with_lump
-from paraflex.mechanism.quantities import known
+from .actuators import Actuator
+from .bodies import Body
+from .cut import Cut
+from .joints import Joint, Motor, PointRef
+from .loads import PointForce, TorsionalDamper
+from .members import Members
+from .payload import with_lump
+from .quantities import known
 
 
 def actuator_motors(actuator: Actuator, mechanism: Members) -> tuple[str, ...]:

@@ -4,11 +4,11 @@ from math import pi
 
 from paraflex.arguments import checked_arguments
 from paraflex.errors import InputError
-from paraflex.mechanism.bodies import RigidBody
-from paraflex.mechanism.joints import PointRef, RevoluteJoint
-from paraflex.mechanism.loads import TorsionalSpring
-from paraflex.mechanism.mechanism import Mechanism
-from paraflex.mechanism.members import Assembly
+from .bodies import RigidBody
+from .joints import PointRef, RevoluteJoint
+from .loads import TorsionalSpring
+from .mechanism import Mechanism
+from .members import Assembly
 
 GRAVITY = (0.0, -9.81)
 

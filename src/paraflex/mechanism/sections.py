@@ -7,7 +7,7 @@ from typing import ClassVar
 
 from paraflex.arguments import CheckedFields, checked_arguments, named_in_errors
 from paraflex.errors import InputError
-from paraflex.mechanism.quantities import check_numbers, field_metadata, optional, positive
+from .quantities import check_numbers, field_metadata, optional, positive
 
 _WALL = field_metadata("the thickness of the wall of a hollow section in m", positive)
 

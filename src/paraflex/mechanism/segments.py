@@ -10,16 +10,16 @@ from paraflex.arguments import checked_arguments
 from paraflex.errors import InputError
 from paraflex.fem import SpanProperties
 from paraflex.limits import SEGMENTS, at_most
-from paraflex.mechanism.bodies import Body, FlexibleBeam, RigidBody, given_shapes
-from paraflex.mechanism.cut import Cut
-from paraflex.mechanism.damping import stiffness_damping
-from paraflex.mechanism.groups import groups_of
-from paraflex.mechanism.joints import Joint, PointRef, RevoluteJoint, points_named
-from paraflex.mechanism.loads import TorsionalDamper, TorsionalSpring
-from paraflex.mechanism.mechanism import Mechanism
-from paraflex.mechanism.members import Assembly
-from paraflex.mechanism.poses import approximate_poses
-from paraflex.mechanism.quantities import known
+from .bodies import Body, FlexibleBeam, RigidBody, given_shapes
+from .cut import Cut
+from .damping import stiffness_damping
+from .groups import groups_of
+from .joints import Joint, PointRef, RevoluteJoint, points_named
+from .loads import TorsionalDamper, TorsionalSpring
+from .mechanism import Mechanism
+from .members import Assembly
+from .poses import approximate_poses
+from .quantities import known
 
 T = TypeVar("T")
 

@@ -13,9 +13,9 @@ from paraflex.arguments import CheckedFields, named_in_errors
 from paraflex.arrays import Numbers
 from paraflex.errors import InputError
 from paraflex.limits import of_size
-from paraflex.mechanism.bodies import AssumedModesBeam, Body, FlexibleBeam
-from paraflex.mechanism.joints import GROUND, Joint, PointRef
-from paraflex.mechanism.quantities import AT_JOINT, field_metadata, finite, known, optional
+from .bodies import AssumedModesBeam, Body, FlexibleBeam
+from .joints import GROUND, Joint, PointRef
+from .quantities import AT_JOINT, field_metadata, finite, known, optional
 
 # Kinds of sensors by their names in files.
 SENSOR_KINDS: "dict[str, type[Sensor]]" = {}

@@ -5,13 +5,13 @@ from dataclasses import dataclass, field, replace
 
 from paraflex.arguments import CheckedFields, checked_arguments
 from paraflex.errors import InputError
-from paraflex.mechanism.bodies import RigidBody
-from paraflex.mechanism.joints import PointRef
-from paraflex.mechanism.mechanism import Mechanism
-from paraflex.mechanism.phases import joint_value
-from paraflex.mechanism.poses import Pose, approximate_poses, placed_poses
-from paraflex.mechanism.profiles import ConstantSpeed, TimeProfile
-from paraflex.mechanism.quantities import known, optional
+from .bodies import RigidBody
+from .joints import PointRef
+from .mechanism import Mechanism
+from .phases import joint_value
+from .poses import Pose, approximate_poses, placed_poses
+from .profiles import ConstantSpeed, TimeProfile
+from .quantities import known, optional
 
 
 @dataclass(frozen=True)

@@ -6,8 +6,8 @@ from math import ceil
 
 import numpy as np
 
-from paraflex.mechanism.bodies import Body, FlexibleBeam
-from paraflex.mechanism.members import Members
+from .bodies import Body, FlexibleBeam
+from .members import Members
 
 # Longest element relative to the beam. With it, the driving torque of a crank shaper and the stress in its lever differ
 # from those with 16 elements by less than 0.4 %; with elements of half a beam by 1.5 %, with a single element by 18 %.

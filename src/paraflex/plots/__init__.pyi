@@ -4,10 +4,7 @@ from typing import Any
 from matplotlib.figure import Figure
 
 from .drawing import mechanism_drawing as mechanism_drawing
-from .equilibria import (
-    buckling_shapes as buckling_shapes,
-    deformed_shapes as deformed_shapes,
-)
+from .equilibria import buckling_shapes as buckling_shapes, deformed_shapes as deformed_shapes
 from .maps import response_map as response_map
 from .mode_shapes import mode_shapes as mode_shapes
 from .parallel import parallel_coordinates as parallel_coordinates

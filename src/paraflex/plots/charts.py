@@ -17,21 +17,12 @@ from paraflex.figures.charts import Chart, Curve, joined
 from paraflex.figures.entry import Figure as CatalogueFigure, prepared
 from paraflex.figures.selection import default_mode, names_of, prototype_pair
 from paraflex.formatting import ROUNDING, peak, shortened
-from paraflex.plots.given import drawn
-from paraflex.plots.labels import mathematics
-from paraflex.plots.layout import (
-    ONE_COLUMN,
-    TWO_COLUMNS,
-    figure_width,
-    finish_plane,
-    is_narrow,
-    label_outer_time,
-    lay_out,
-    panels,
-)
-from paraflex.plots.scales import BESIDE, LIST_LINE, list_lines, set_scale
-from paraflex.plots.style import BLACK, COLOURS, SHADE, journal_style
 from paraflex.units import DisplayUnit
+from .given import drawn
+from .labels import mathematics
+from .layout import ONE_COLUMN, TWO_COLUMNS, figure_width, finish_plane, is_narrow, label_outer_time, lay_out, panels
+from .scales import BESIDE, LIST_LINE, list_lines, set_scale
+from .style import BLACK, COLOURS, SHADE, journal_style
 
 # Largest number of panels for members below one another in a figure of one column, and of those of designs.
 _MOST_BELOW, _MOST_STACKED = 12, 4

@@ -8,11 +8,11 @@ from matplotlib.figure import Figure
 from paraflex.arguments import checked_arguments
 from paraflex.figures import comparison as described
 from paraflex.figures.entry import Figure as CatalogueFigure
-from paraflex.plots.charts import print_figure
-from paraflex.plots.planned import PlannedFigure
-from paraflex.plots.save import write_figures
-from paraflex.plots.style import journal_style
 from paraflex.results.comparison import RunComparison
+from .charts import print_figure
+from .planned import PlannedFigure
+from .save import write_figures
+from .style import journal_style
 
 # Heights of a panel [mm], and number of panels from which they are low.
 _HIGH, _LOW, _MANY = 38.0, 26.0, 6

@@ -16,22 +16,12 @@ from matplotlib.patches import Polygon
 from paraflex.errors import InputError
 from paraflex.figures.shapes import figure_of
 from paraflex.formatting import number
-from paraflex.plots.given import drawn
-from paraflex.plots.labels import plain
-from paraflex.plots.layout import MM, TWO_COLUMNS, page_width
-from paraflex.plots.marks import LOOKS, by_look, key_arrow, moving_marks, still_marks
-from paraflex.plots.scene import (
-    Limits,
-    Scene,
-    common_limits,
-    default_magnification,
-    is_plate,
-    run_times,
-    scale_bar,
-    scene,
-    select,
-)
-from paraflex.plots.themes import Theme, theme
+from .given import drawn
+from .labels import plain
+from .layout import MM, TWO_COLUMNS, page_width
+from .marks import LOOKS, by_look, key_arrow, moving_marks, still_marks
+from .scene import Limits, Scene, common_limits, default_magnification, is_plate, run_times, scale_bar, scene, select
+from .themes import Theme, theme
 
 # Largest number of bodies whose names fit under a picture.
 _MOST_NAMED = 9

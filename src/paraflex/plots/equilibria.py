@@ -10,13 +10,13 @@ from paraflex.arrays import Array
 from paraflex.errors import InputError
 from paraflex.figures.equilibria import buckled, given_coordinates
 from paraflex.formatting import number
-from paraflex.plots.drawing import draw_scale_bar, pictures
-from paraflex.plots.given import drawn
-from paraflex.plots.layout import is_narrow
-from paraflex.plots.scene import Scene, scene
-from paraflex.plots.themes import theme
 from paraflex.results.kinds import check_kind
 from paraflex.results.statics_steps import as_samples
+from .drawing import draw_scale_bar, pictures
+from .given import drawn
+from .layout import is_narrow
+from .scene import Scene, scene
+from .themes import theme
 
 # Width of links relative to that in a film.
 _WIDTH = 0.7

@@ -9,11 +9,11 @@ import xarray as xr
 
 from paraflex.arguments import checked_arguments
 from paraflex.errors import InputError
-from paraflex.plots.film_files import find_encoder, write_film
-from paraflex.plots.film_pictures import FOOT, HEAD, Film
-from paraflex.plots.scene import Scene, common_limits, default_magnification, run_times, scene, select
-from paraflex.plots.themes import theme
 from paraflex.writing import whole_file, whole_folder
+from .film_files import find_encoder, write_film
+from .film_pictures import FOOT, HEAD, Film
+from .scene import Scene, common_limits, default_magnification, run_times, scene, select
+from .themes import theme
 
 FILM_FORMATS = (".mp4", ".gif", ".svg", ".png")
 # Shortest film at the default speed [s], the speeds from which that is chosen, and the largest number of pictures.

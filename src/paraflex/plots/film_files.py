@@ -18,11 +18,11 @@ from PIL import GifImagePlugin, Image, ImageChops
 
 from paraflex.errors import InputError, OutputError
 from paraflex.interrupts import starting_processes
-from paraflex.plots.drawing import caption
-from paraflex.plots.film_pictures import Film, clock, frames, stage
-from paraflex.plots.labels import plain
-from paraflex.plots.style import journal_style
-from paraflex.plots.svg import Pen, animated, moving_elements
+from .drawing import caption
+from .film_pictures import Film, clock, frames, stage
+from .labels import plain
+from .style import journal_style
+from .svg import Pen, animated, moving_elements
 
 Report = Callable[[int, int], None]
 

@@ -10,11 +10,11 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from paraflex.arrays import Array, NDArray
-from paraflex.plots.drawing import Sketch, bare, caption, draw_load_keys, draw_scale_bar, name_links
-from paraflex.plots.labels import plain
-from paraflex.plots.scene import Scene, common_limits
-from paraflex.plots.style import journal_style
-from paraflex.plots.themes import Theme
+from .drawing import Sketch, bare, caption, draw_load_keys, draw_scale_bar, name_links
+from .labels import plain
+from .scene import Scene, common_limits
+from .style import journal_style
+from .themes import Theme
 
 # Shares of the picture's height above and below the drawing.
 HEAD, FOOT = 0.105, 0.11

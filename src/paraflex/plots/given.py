@@ -12,9 +12,9 @@ from matplotlib.figure import Figure
 
 from paraflex.arguments import checked_arguments
 from paraflex.errors import InputError
-from paraflex.plots.catalogue import CATALOGUE
-from paraflex.plots.style import journal_style
 from paraflex.results.kinds import kind_of, wrong_kind
+from .catalogue import CATALOGUE
+from .style import journal_style
 
 D = TypeVar("D")
 P = ParamSpec("P")
@@ -58,7 +58,7 @@ def _of_a_kind(data: Any, kinds: Mapping[str, str]) -> Any:
         if kind_of(data) not in kinds:
             raise wrong_kind(kind_of(data), kinds)
         return data
-    from paraflex.plots.sources import open_source
+    from .sources import open_source
 
     source = open_source(data)
     if source.kind not in kinds:

@@ -20,8 +20,8 @@ from paraflex.arrays import NDArray
 from paraflex.figures.charts import TIME
 from paraflex.formatting import ROUNDING
 from paraflex.mechanism.quantities import known
-from paraflex.plots.labels import mathematics
-from paraflex.plots.style import STYLE
+from .labels import mathematics
+from .style import STYLE
 
 ONE_COLUMN, TWO_COLUMNS = 84.0, 174.0  # Widths of a journal's columns [mm].
 COLUMNS = {"single": ONE_COLUMN, "double": TWO_COLUMNS}

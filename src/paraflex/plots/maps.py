@@ -14,9 +14,9 @@ from paraflex.arrays import Array
 from paraflex.errors import InputError
 from paraflex.figures.designs import DesignTable
 from paraflex.formatting import logarithmic_number, peak
-from paraflex.plots.given import drawn
-from paraflex.plots.labels import mathematics
-from paraflex.plots.layout import ONE_COLUMN, TWO_COLUMNS, is_narrow, lay_out, panels
+from .given import drawn
+from .labels import mathematics
+from .layout import ONE_COLUMN, TWO_COLUMNS, is_narrow, lay_out, panels
 
 # Largest number of panels, approximate number of contour lines of a panel, and shades between two lines.
 _MOST_METRICS, _LINES, _BETWEEN = 3, 7, 4

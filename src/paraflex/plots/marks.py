@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from paraflex.arrays import Array
-from paraflex.plots.scene import ARROW, BLOCK, TURN, DrawnJoint, DrawnLoad, Limits, Scene
+from .scene import ARROW, BLOCK, TURN, DrawnJoint, DrawnLoad, Limits, Scene
 
 # Sizes as shares of the picture's larger side.
 PIN, TRIANGLE, RAIL, MOTOR = 0.008, 0.028, 0.02, 0.0125

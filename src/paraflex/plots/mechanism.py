@@ -10,13 +10,13 @@ from matplotlib.axes import Axes
 from paraflex.arrays import Array
 from paraflex.figures.selection import names_of, samples
 from paraflex.figures.shapes import figure_of
-from paraflex.plots.drawing import Sketch
-from paraflex.plots.labels import symbol
-from paraflex.plots.marks import still_marks
-from paraflex.plots.scene import DrawnJoint, Scene, limits_of, run_times, scene
-from paraflex.plots.style import BLACK
-from paraflex.plots.themes import theme
 from paraflex.results.outlines import figure_order
+from .drawing import Sketch
+from .labels import symbol
+from .marks import still_marks
+from .scene import DrawnJoint, Scene, limits_of, run_times, scene
+from .style import BLACK
+from .themes import theme
 
 _LOOK = replace(theme("light"), ink=BLACK, earth=BLACK, links=("#737373",))
 # Millimetres per metre, and number of samples of a run from which the travel of sliding joints is found.

@@ -7,7 +7,7 @@ from paraflex.display import facts, page, sentence, table
 from paraflex.dynamics.constraints import constraint_count
 from paraflex.late import view
 from paraflex.mechanism import Body, Mechanism, grouped, loops
-from paraflex.plots.svg import sketch
+from .svg import sketch
 
 # Largest number of bodies, joints or modes listed one by one.
 _MOST_LISTED = 40

@@ -9,14 +9,14 @@ from matplotlib.figure import Figure
 from paraflex.errors import InputError
 from paraflex.figures.selection import default_mode, names_of, place_of
 from paraflex.formatting import number
-from paraflex.plots.drawing import pictures
-from paraflex.plots.given import drawn
-from paraflex.plots.labels import plain
-from paraflex.plots.layout import is_narrow
-from paraflex.plots.scene import Scene, scene
-from paraflex.plots.themes import theme
 from paraflex.results.linear_motion import SWING, DrawnMode, drawn_modes, modal_motion
 from paraflex.results.linear_summary import HELD_WORDS, HOLDINGS
+from .drawing import pictures
+from .given import drawn
+from .labels import plain
+from .layout import is_narrow
+from .scene import Scene, scene
+from .themes import theme
 
 # Width of links relative to that in a film.
 _WIDTH = 0.45

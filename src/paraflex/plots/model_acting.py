@@ -5,11 +5,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from paraflex.arrays import Array
-from paraflex.plots.marks import round_arrow, straight_arrow
-from paraflex.plots.scene import ARROW, BLOCK, TURN, DrawnJoint, Limits, Scene
-from paraflex.plots.signs import Arrow
 from paraflex.results.acting import ActingLoad, acting_load
 from paraflex.results.posed import Posed
+from .marks import round_arrow, straight_arrow
+from .scene import ARROW, BLOCK, TURN, DrawnJoint, Limits, Scene
+from .signs import Arrow
 
 # Length of the shortest arrow of a load relative to that of the largest.
 _SHORTEST = 0.35

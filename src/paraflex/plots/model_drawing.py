@@ -13,17 +13,17 @@ from paraflex.arrays import Array
 from paraflex.figures.shapes import along, figure_of
 from paraflex.formatting import number as number_text, printable
 from paraflex.mechanism import GROUND, Mechanism
-from paraflex.plots.drawing import Sketch
-from paraflex.plots.layout import MM, TWO_COLUMNS, page_width
-from paraflex.plots.marks import moving_marks, still_marks
-from paraflex.plots.model_acting import Acting, acting_arrows, load_places
-from paraflex.plots.model_sensors import SENSOR, SensorMark, sensor_marks
-from paraflex.plots.named import Name, place_names
-from paraflex.plots.scene import Limits, Scene, common_limits, limits_of, scene
-from paraflex.plots.signs import arrow_sign, draw_arrow, joint_sign, sign_legend
-from paraflex.plots.style import journal_style
-from paraflex.plots.themes import Theme, theme
 from paraflex.results.posed import Posed
+from .drawing import Sketch
+from .layout import MM, TWO_COLUMNS, page_width
+from .marks import moving_marks, still_marks
+from .model_acting import Acting, acting_arrows, load_places
+from .model_sensors import SENSOR, SensorMark, sensor_marks
+from .named import Name, place_names
+from .scene import Limits, Scene, common_limits, limits_of, scene
+from .signs import arrow_sign, draw_arrow, joint_sign, sign_legend
+from .style import journal_style
+from .themes import Theme, theme
 
 _MM_OF_POINT = 25.4 / 72.0
 # Room around the panel: left, right, below with the legend, above with the title [mm].

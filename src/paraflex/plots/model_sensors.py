@@ -8,10 +8,10 @@ import numpy as np
 from paraflex.arrays import Array
 from paraflex.mechanism import GROUND, AssumedModesBeam, FlexibleBeam
 from paraflex.mechanism.sensors import Location, Sensor
-from paraflex.plots.marks import round_arrow, straight_arrow
-from paraflex.plots.scene import Limits
-from paraflex.plots.signs import Arrow
 from paraflex.results.posed import Posed
+from .marks import round_arrow, straight_arrow
+from .scene import Limits
+from .signs import Arrow
 
 # Look of a sensor's mark.
 SENSOR: dict[str, Any] = {"marker": "D", "markersize": 3.6, "markeredgewidth": 1.0, "linestyle": "none"}

@@ -12,10 +12,10 @@ from matplotlib.figure import Figure
 from paraflex.arrays import Array
 from paraflex.figures.designs import DesignTable, column_label
 from paraflex.formatting import number, typeset
-from paraflex.plots.given import drawn
-from paraflex.plots.labels import mathematics, plain
-from paraflex.plots.layout import is_narrow, lay_out, panels
-from paraflex.plots.style import VERMILLION
+from .given import drawn
+from .labels import mathematics, plain
+from .layout import is_narrow, lay_out, panels
+from .style import VERMILLION
 
 # Number of metrics by default, largest numbers of axes and of lines, and height of an axis [mm].
 _METRICS, _AXES, _LINES, _AXIS_HEIGHT = 3, 10, 2000, 10.0

@@ -11,12 +11,12 @@ from paraflex import plots
 from paraflex.errors import InputError, suggestion
 from paraflex.figures.entry import Figure as CatalogueFigure
 from paraflex.figures.selection import default_mode, names_of, place_of, point_number, prototype_pair
-from paraflex.plots.catalogue import CATALOGUE, figure_names
+from .catalogue import CATALOGUE, figure_names
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-    from paraflex.plots.sources import Source
+    from .sources import Source
 
 
 @dataclass(frozen=True)

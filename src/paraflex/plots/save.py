@@ -12,12 +12,12 @@ from paraflex.arguments import checked_arguments
 from paraflex.errors import InputError
 from paraflex.folders import added_to
 from paraflex.mechanism.quantities import all_known
-from paraflex.plots.layout import column_width
-from paraflex.plots.planned import PlannedFigure, drawings, figures_of
-from paraflex.plots.sources import Source, kind_of_numbers
-from paraflex.plots.style import journal_style
 from paraflex.results.kinds import kind_of
 from paraflex.writing import portable_name, whole_file
+from .layout import column_width
+from .planned import PlannedFigure, drawings, figures_of
+from .sources import Source, kind_of_numbers
+from .style import journal_style
 
 # Metadata without dates, so that files do not depend on when they are written.
 _METADATA: Mapping[str, dict[str, Any]] = {"png": {}, "svg": {"Date": None}, "pdf": {"CreationDate": None}}

@@ -14,8 +14,8 @@ from matplotlib.ticker import FixedLocator, LogLocator, NullFormatter, NullLocat
 from paraflex.arrays import Array
 from paraflex.figures.charts import Axis, is_logarithmic, symmetrical_numbers
 from paraflex.formatting import logarithmic_number
-from paraflex.plots.labels import plain
 from paraflex.units import DisplayUnit
+from .labels import plain
 
 # Height of a line in a list of names [mm].
 LIST_LINE = 5.5

@@ -16,10 +16,10 @@ from matplotlib.path import Path
 from matplotlib.transforms import Affine2D, Transform
 
 from paraflex.arrays import Array
-from paraflex.plots.drawing import PIN_SIZE
-from paraflex.plots.marks import LOOKS, SYMBOLS, motor, round_arrow, straight_arrow
-from paraflex.plots.scene import DrawnJoint, Limits
-from paraflex.plots.themes import Theme
+from .drawing import PIN_SIZE
+from .marks import LOOKS, SYMBOLS, motor, round_arrow, straight_arrow
+from .scene import DrawnJoint, Limits
+from .themes import Theme
 
 # Length and radius of arrows in a legend, as shares of the picture's larger side, and relative size of their heads.
 _LONG, _ROUND, _HEAD = 0.04, 0.014, 0.55

@@ -11,10 +11,10 @@ from paraflex.arrays import Array, Indices
 from paraflex.figures.shapes import figure_of, travelled
 from paraflex.formatting import printable
 from paraflex.mechanism import Mechanism
-from paraflex.plots.marks import LOOKS, Mark, moving_marks, still_marks
-from paraflex.plots.scene import Limits, Scene, is_plate, scene
-from paraflex.plots.themes import PAGE, Theme
 from paraflex.results.drawing import assembled_data
+from .marks import LOOKS, Mark, moving_marks, still_marks
+from .scene import Limits, Scene, is_plate, scene
+from .themes import PAGE, Theme
 
 # Distance from the chord below which points of a line are omitted [pixels].
 _STRAIGHT = 0.15

@@ -9,10 +9,10 @@ from matplotlib.figure import Figure
 
 from paraflex.arrays import Array
 from paraflex.figures.shapes import along
-from paraflex.plots.given import drawn
-from paraflex.plots.layout import ONE_COLUMN, finish_plane, panels
-from paraflex.plots.mechanism import draw_mechanism
-from paraflex.plots.style import BLACK, BLUE
+from .given import drawn
+from .layout import ONE_COLUMN, finish_plane, panels
+from .mechanism import draw_mechanism
+from .style import BLACK, BLUE
 
 _START: dict[str, Any] = {
     "color": BLACK, "linestyle": "none", "marker": "s", "markersize": 4.5, "zorder": 4.0, "label": "start",

@@ -13,14 +13,13 @@ import numpy as np
 
 from paraflex.arguments import checked_arguments
 from paraflex.arrays import Array
-from paraflex.dynamics import State, System
-from paraflex.dynamics.rank import dependence
+from paraflex.dynamics import State, System, dependence
 from paraflex.dynamics.sparse import stiffness_diagonal
 from paraflex.errors import ActuationError, InputError, SingularActuationError
 from paraflex.mechanism import ActuationMode, Mechanism, mode_of_motors
 from paraflex.motion import MotionRun
-from paraflex.reduced_bodies.deflections import PlannedDeflections
 from paraflex.tracking import TrackingRun, TrackingTask
+from .deflections import PlannedDeflections
 
 # Directions with less than this fraction of the largest root of energy are rounding.
 _ROUNDING = 1e-10

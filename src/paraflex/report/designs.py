@@ -10,7 +10,7 @@ from paraflex.arrays import NDArray
 from paraflex.figures.charts import Axis, Chart, Panel, is_logarithmic, look
 from paraflex.figures.designs import DesignTable, in_conflict
 from paraflex.formatting import count, superscripts
-from paraflex.report.packing import Series
+from .packing import Series
 
 LOWER = (
     "Less is taken as better; metrics for which more may be better, as safety factor and stiffness, select no design."

@@ -13,7 +13,7 @@ from paraflex.errors import InputError
 from paraflex.figures.shapes import figure_of
 from paraflex.plots.marks import DOT, LOOKS, Mark, key_arrow, moving_marks, still_marks
 from paraflex.plots.scene import JOINT_BASES, Limits, Scene, common_limits, default_magnification, is_plate, scene
-from paraflex.report.packing import packed
+from .packing import packed
 
 MOST_FRAMES = 350
 _SHAPES = ("shape", "shape_base", "joint_position", "joint_direction")

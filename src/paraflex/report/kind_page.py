@@ -11,11 +11,11 @@ from paraflex.arguments import checked_arguments
 from paraflex.figures.catalogue import page_panels
 from paraflex.figures.runs import thinned
 from paraflex.folders.kinds import RESULT_KINDS
-from paraflex.report.page import Page
-from paraflex.report.provenance import asked, command_line, verdict_word
-from paraflex.report.text import sections
 from paraflex.results.findings import finding_lines, verdict_of
 from paraflex.results.kinds import kind_of
+from .page import Page
+from .provenance import asked, command_line, verdict_word
+from .text import sections
 
 
 @checked_arguments()

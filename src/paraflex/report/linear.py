@@ -9,12 +9,12 @@ import xarray as xr
 from paraflex.arguments import checked_arguments
 from paraflex.figures.selection import default_mode, names_of
 from paraflex.formatting import number
-from paraflex.report.film import Animation, animation
-from paraflex.report.kind_page import kind_page
-from paraflex.report.page import Page
 from paraflex.results.kinds import check_kind
 from paraflex.results.linear_motion import DrawnMode, drawn_modes, modal_motion
 from paraflex.results.linear_summary import HELD_WORDS, about, remarks
+from .film import Animation, animation
+from .kind_page import kind_page
+from .page import Page
 
 # Number of frames of a period, and its duration [s].
 _FRAMES, _PERIOD = 33, 2.0

@@ -9,10 +9,10 @@ from paraflex.figures.controllers import controller_table
 from paraflex.figures.loads import effort_table, joint_tables, stress_table
 from paraflex.figures.selection import names_of
 from paraflex.formatting import number, quantity, speed_text, text_symbol
-from paraflex.report.text import by_run, sections, table_html
 from paraflex.results.controllers import controller_figures
 from paraflex.results.loads import load_figures, load_text, ranked
 from paraflex.units import EFFORTS
+from .text import by_run, sections, table_html
 
 # Largest number of prescribed motions with a tile.
 _MOST_TILES = 2

@@ -13,15 +13,15 @@ from paraflex.figures.run_tables import Runs, most_bent, solver_table
 from paraflex.figures.selection import as_runs, names_of, samples
 from paraflex.findings import DONE_STATUSES
 from paraflex.formatting import number, peak, quantity, text_symbol, typeset
-from paraflex.report.film import NO_SHAPES, animation
-from paraflex.report.kind_page import kind_page
-from paraflex.report.loads import load_tables, load_tiles
-from paraflex.report.page import Page
-from paraflex.report.provenance import common_facts
-from paraflex.report.text import pairs, sections, table_pairs
 from paraflex.results.findings import finished, validity_line, validity_summary
 from paraflex.results.kinds import check_kind
 from paraflex.results.loads import load_figures
+from .film import NO_SHAPES, animation
+from .kind_page import kind_page
+from .loads import load_tables, load_tiles
+from .page import Page
+from .provenance import common_facts
+from .text import pairs, sections, table_pairs
 
 
 @checked_arguments()

@@ -32,12 +32,12 @@ from paraflex.figures.charts import (
 from paraflex.folders import added_to
 from paraflex.formatting import logarithmic_number, shortened, typeset
 from paraflex.plots.themes import THEMES
-from paraflex.report.designs import Designs
-from paraflex.report.film import Animation
-from paraflex.report.packing import Series
-from paraflex.report.text import pairs
 from paraflex.units import DisplayUnit
 from paraflex.writing import write_text
+from .designs import Designs
+from .film import Animation
+from .packing import Series
+from .text import pairs
 
 # Number of notices from which they are folded.
 _FOLDED = 3

@@ -7,9 +7,9 @@ import xarray as xr
 from paraflex.arguments import checked_arguments
 from paraflex.figures.reduction import bound_sentences
 from paraflex.formatting import number
-from paraflex.report.kind_page import kind_page
-from paraflex.report.page import Page
 from paraflex.results.kinds import check_kind
+from .kind_page import kind_page
+from .page import Page
 
 
 @checked_arguments()

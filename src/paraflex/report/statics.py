@@ -14,13 +14,13 @@ from paraflex.figures.charts import Panel
 from paraflex.figures.equilibria import quantity_word, unit_of
 from paraflex.figures.selection import names_of
 from paraflex.formatting import NO_VALUE, number, quantity, text_symbol
-from paraflex.report.film import NO_SHAPES, Animation, animation, frames_of
-from paraflex.report.kind_page import kind_page
-from paraflex.report.page import Page
 from paraflex.results.findings import validity_line
 from paraflex.results.kinds import check_kind
 from paraflex.results.statics_data import statics_summary
 from paraflex.results.statics_steps import as_samples, step_kinds
+from .film import NO_SHAPES, Animation, animation, frames_of
+from .kind_page import kind_page
+from .page import Page
 
 # Duration of the animation from the first step to the last [s].
 _DURATION = 5.0

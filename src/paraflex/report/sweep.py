@@ -19,11 +19,11 @@ from paraflex.figures.runs import thinned
 from paraflex.figures.search import IDENTIFICATION
 from paraflex.figures.tables import Column, Table, in_row_units
 from paraflex.formatting import NO_VALUE, count, quantity
-from paraflex.report.choice import Picked, drawn_rows
-from paraflex.report.designs import LOWER, Designs, survey
-from paraflex.report.film import animation
-from paraflex.report.page import Page
-from paraflex.report.text import sections, table_html
+from .choice import Picked, drawn_rows
+from .designs import LOWER, Designs, survey
+from .film import animation
+from .page import Page
+from .text import sections, table_html
 
 _NO_RUN = "None of the best designs was simulated again, so there is no animation."
 # Largest number of columns in the table of best designs; the study's table has all.

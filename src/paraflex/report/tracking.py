@@ -15,16 +15,16 @@ from paraflex.figures.run_tables import Runs, after_table, result_table, solver_
 from paraflex.figures.selection import default_mode, names_of, samples
 from paraflex.findings import DONE_STATUSES
 from paraflex.formatting import number, peak, quantity
-from paraflex.report.film import NO_SHAPES, animation
-from paraflex.report.kind_page import kind_page
-from paraflex.report.loads import load_tables, load_tiles
-from paraflex.report.page import Page
-from paraflex.report.provenance import asked, common_facts, model_words, summary_beside, verdict_word
-from paraflex.report.text import sections
 from paraflex.results.findings import finished, validity_line, validity_summary
 from paraflex.results.following import headline
 from paraflex.results.kinds import check_kind
 from paraflex.results.loads import load_figures
+from .film import NO_SHAPES, animation
+from .kind_page import kind_page
+from .loads import load_tables, load_tiles
+from .page import Page
+from .provenance import asked, common_facts, model_words, summary_beside, verdict_word
+from .text import sections
 
 
 def report_of_folder(data: xr.Dataset, folder: Path) -> Page:

@@ -9,24 +9,17 @@ import xarray as xr
 
 from paraflex.arguments import checked_arguments
 from paraflex.figures.selection import names_of
-from paraflex.figures.verification import (
-    distance_table,
-    link_tables,
-    model_table,
-    path_extent,
-    printed,
-    runs_of_mode,
-)
+from paraflex.figures.verification import distance_table, link_tables, model_table, path_extent, printed, runs_of_mode
 from paraflex.findings import Finding
 from paraflex.formatting import quantity
-from paraflex.report.film import NO_SHAPES, animation
-from paraflex.report.kind_page import kind_page
-from paraflex.report.page import Page
-from paraflex.report.provenance import asked, command_line, common_facts, summary_beside
-from paraflex.report.text import sections
 from paraflex.results.findings import finding_lines
 from paraflex.results.following import SPAN_WORDS, ErrorSpan
 from paraflex.results.kinds import check_kind
+from .film import NO_SHAPES, animation
+from .kind_page import kind_page
+from .page import Page
+from .provenance import asked, command_line, common_facts, summary_beside
+from .text import sections
 
 _ENGINES = ("exudyn", "mujoco")
 

@@ -6,8 +6,8 @@ import numpy as np
 import xarray as xr
 
 from paraflex.arrays import Array, NDArray
-from paraflex.results.loads import OF_BEAMS
-from paraflex.results.numbers import largest
+from .loads import OF_BEAMS
+from .numbers import largest
 
 # Dimensions of stations along beams and of joints that slide along them.
 SECTION, CONTACT = "section", "contact"

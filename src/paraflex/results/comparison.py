@@ -16,10 +16,10 @@ from paraflex.errors import InputError
 from paraflex.folders import RUN, kind_of_folder
 from paraflex.formatting import number
 from paraflex.mechanism.quantities import known
-from paraflex.results.kinds import kind_of, wrong_kind
-from paraflex.results.loads import load_figures, ranked
-from paraflex.results.metrics import METRICS
-from paraflex.results.storage import open_results
+from .kinds import kind_of, wrong_kind
+from .loads import load_figures, ranked
+from .metrics import METRICS
+from .storage import open_results
 
 # Time-dependent variables that are compared, by the kind of results.
 _ENERGIES = ("strain_energy", "kinetic_energy")

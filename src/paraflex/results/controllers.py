@@ -12,8 +12,8 @@ import xarray as xr
 
 from paraflex.arrays import Array
 from paraflex.errors import InputError
-from paraflex.results.formulas import largest_norm
-from paraflex.results.numbers import finite_or_none, largest, name_units
+from .formulas import largest_norm
+from .numbers import finite_or_none, largest, name_units
 
 if TYPE_CHECKING:
     from paraflex.control.loop.run_loop import ControllerRecord

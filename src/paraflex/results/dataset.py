@@ -12,23 +12,15 @@ from paraflex.errors import InputError, as_enum
 from paraflex.findings import Finding
 from paraflex.integrators import IntegrationOptions
 from paraflex.kinematics import Path, length_fraction
-from paraflex.results.acting import load_variables
-from paraflex.results.controllers import INTERNAL, with_controllers
-from paraflex.results.findings import MODE, keep_findings, validity_variables
-from paraflex.results.following import KEPT_METRICS, ErrorSpan, PathPart, metric_variables, too_short
-from paraflex.results.kinds import BRAKE_ENERGY, RUN_FIGURES
-from paraflex.results.labelled import (
-    Variables,
-    error_variables,
-    label,
-    link_coordinates,
-    padded,
-    provenance,
-    with_totals,
-)
-from paraflex.results.record import Record, record
 from paraflex.tracking import TrackingRun
 from paraflex.validity import beyond_range, implausible_numbers
+from .acting import load_variables
+from .controllers import INTERNAL, with_controllers
+from .findings import MODE, keep_findings, validity_variables
+from .following import KEPT_METRICS, ErrorSpan, PathPart, metric_variables, too_short
+from .kinds import BRAKE_ENERGY, RUN_FIGURES
+from .labelled import Variables, error_variables, label, link_coordinates, padded, provenance, with_totals
+from .record import Record, record
 
 
 @checked_arguments()

@@ -14,9 +14,9 @@ from paraflex.errors import InputError
 from paraflex.mechanism import GROUND, Body, Joint, Mechanism, PointRef, Pose, Relation, RigidBody, placed_poses
 from paraflex.mechanism.gears import SumRelation
 from paraflex.mechanism.poses import local_points
-from paraflex.results.numbers import stacked
-from paraflex.results.outlines import Hold, Outline, in_line, outline_motion, outlines, stiff_shape, turned
-from paraflex.results.stiff import rigid_frames
+from .numbers import stacked
+from .outlines import Hold, Outline, in_line, outline_motion, outlines, stiff_shape, turned
+from .stiff import rigid_frames
 
 # Joints of wheels and of racks: whether they slide, and the constraints they hold.
 _WHEEL, _RACK = (False, {"points"}), (True, {"axis", "angle"})

@@ -17,12 +17,12 @@ from paraflex.arguments import checked_arguments
 from paraflex.arrays import NDArray
 from paraflex.errors import InputError, suggestion
 from paraflex.folders import RESULT_KINDS, added_to
-from paraflex.results.beam_stresses import SECTION
-from paraflex.results.controllers import SAMPLE, controller_names, controller_variables, dimension
-from paraflex.results.kinds import kind_of
-from paraflex.results.storage import save_results
-from paraflex.results.tables import read_parquet, spreadsheet_table, write_parquet
 from paraflex.writing import whole_file
+from .beam_stresses import SECTION
+from .controllers import SAMPLE, controller_names, controller_variables, dimension
+from .kinds import kind_of
+from .storage import save_results
+from .tables import read_parquet, spreadsheet_table, write_parquet
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -9,10 +9,10 @@ import xarray as xr
 
 from paraflex.arguments import checked_arguments
 from paraflex.findings import Finding
-from paraflex.results.formulas import SAME_TIME, settling_time
-from paraflex.results.kinds import check_kind
-from paraflex.results.metrics import METRICS, Metric
-from paraflex.results.traces import data_traces
+from .formulas import SAME_TIME, settling_time
+from .kinds import check_kind
+from .metrics import METRICS, Metric
+from .traces import data_traces
 
 # Variables of a dataset from which tracking metrics are computed.
 _TRACES = ["end_effector", "end_effector_desired", "torque"]

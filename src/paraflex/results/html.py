@@ -12,10 +12,10 @@ from paraflex.integrators.methods import title_of
 from paraflex.late import view
 from paraflex.mechanism import PointRef, TimeProfile
 from paraflex.motion import MotionRun
-from paraflex.results.metrics import METRICS
-from paraflex.results.outlines import deflections
-from paraflex.results.run_traces import run_traces
 from paraflex.tracking import TrackingRun
+from .metrics import METRICS
+from .outlines import deflections
+from .run_traces import run_traces
 
 # Largest number of points in the table.
 _MOST_LISTED = 20

@@ -11,22 +11,16 @@ from paraflex.arrays import NDArray
 from paraflex.dynamics import System
 from paraflex.integrators import IntegrationOptions
 from paraflex.mechanism import Mechanism
-from paraflex.results.beam_stresses import largest_stresses
-from paraflex.results.drawing import drawing_coordinates
-from paraflex.results.findings import VALIDITY_UNITS
-from paraflex.results.links import Links
-from paraflex.results.metrics import METRICS
-from paraflex.results.numbers import name_units
-from paraflex.results.sensors import READING, SENSOR
-from paraflex.results.storage import origin
-from paraflex.results.stress import (
-    COMMENTS as STRESS_COMMENTS,
-    MOMENT,
-    UNITS as STRESS_UNITS,
-    Variables,
-    section_coordinates,
-)
 from paraflex.units import RATES
+from .beam_stresses import largest_stresses
+from .drawing import drawing_coordinates
+from .findings import VALIDITY_UNITS
+from .links import Links
+from .metrics import METRICS
+from .numbers import name_units
+from .sensors import READING, SENSOR
+from .storage import origin
+from .stress import COMMENTS as STRESS_COMMENTS, MOMENT, UNITS as STRESS_UNITS, Variables, section_coordinates
 
 UNITS = (
     {

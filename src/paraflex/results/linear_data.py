@@ -16,9 +16,9 @@ from paraflex.errors import InputError
 from paraflex.linear.branches import pole_branches
 from paraflex.linear.model import LinearModel
 from paraflex.linear.motions import Motions
-from paraflex.results.drawing import Drawing, drawing_coordinates, system_drawing
-from paraflex.results.linear_summary import ENCODERS, END_EFFECTOR, HOLDINGS
-from paraflex.results.storage import origin
+from .drawing import Drawing, drawing_coordinates, system_drawing
+from .linear_summary import ENCODERS, END_EFFECTOR, HOLDINGS
+from .storage import origin
 
 # Number of undamped modes with mode shapes, and of logarithmically spaced frequencies of the response.
 _SHAPES, _EVEN = 8, 300

@@ -7,8 +7,8 @@ import numpy as np
 import xarray as xr
 
 from paraflex.arrays import Array
-from paraflex.results.linear_data import DRAWN
-from paraflex.results.linear_summary import HOLDINGS, common_poles
+from .linear_data import DRAWN
+from .linear_summary import HOLDINGS, common_poles
 
 # Variables of a drawn run and of its undeformed base, by their names in `Drawing`.
 _VARIABLES = {

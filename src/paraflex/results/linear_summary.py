@@ -10,7 +10,7 @@ import xarray as xr
 from paraflex.arguments import checked_arguments
 from paraflex.arrays import Array, Complex
 from paraflex.formatting import number, quantity
-from paraflex.results.kinds import check_kind
+from .kinds import check_kind
 
 # Motors are free, or those of the actuation mode are held.
 HOLDINGS = ("free", "held")

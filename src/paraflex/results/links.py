@@ -19,11 +19,11 @@ from paraflex.dynamics.points import PointMotion, marker_motion, point_motion
 from paraflex.dynamics.sections import Sections
 from paraflex.integrators import Solution
 from paraflex.mechanism import FIRST_END, LAST_END, PointRef
-from paraflex.results.drawing import drawing_variables, system_drawing
-from paraflex.results.numbers import single, stacked
-from paraflex.results.outlines import chord_deflections
-from paraflex.results.sensors import READING, SENSOR
-from paraflex.results.stress import Variables, section_result, section_variables
+from .drawing import drawing_variables, system_drawing
+from .numbers import single, stacked
+from .outlines import chord_deflections
+from .sensors import READING, SENSOR
+from .stress import Variables, section_result, section_variables
 
 
 @dataclass(frozen=True, kw_only=True)

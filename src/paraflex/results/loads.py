@@ -9,8 +9,8 @@ import xarray as xr
 from paraflex.arrays import Mask
 from paraflex.findings import RESOLVED
 from paraflex.formatting import display_unit, error_text, number, quantity, speed_text
-from paraflex.results.numbers import finite_or_none, largest, units_of_each
 from paraflex.units import EFFORTS, RATES
+from .numbers import finite_or_none, largest, units_of_each
 
 Figures = dict[str, float | str | None]
 # Variables of beams, and the keys that differ from their names.

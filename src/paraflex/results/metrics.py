@@ -17,9 +17,9 @@ import numpy as np
 from paraflex.errors import InputError
 from paraflex.mechanism import rotor_mass
 from paraflex.mechanism.quantities import known
-from paraflex.results.formulas import drift_speed, largest_norm, overshoot, rms, settling_time, vibration
-from paraflex.results.traces import Trace
 from paraflex.units import WHERE_IT_SLIDES
+from .formulas import drift_speed, largest_norm, overshoot, rms, settling_time, vibration
+from .traces import Trace
 
 if TYPE_CHECKING:
     from paraflex.actuation import Electrical

@@ -13,21 +13,13 @@ from paraflex.findings import Finding
 from paraflex.integrators import IntegrationOptions
 from paraflex.integrators.methods import title_of
 from paraflex.motion import MotionRun
-from paraflex.results.acting import load_variables
-from paraflex.results.controllers import with_controllers
-from paraflex.results.findings import keep_findings, validity_variables
-from paraflex.results.kinds import RUN_FIGURES
-from paraflex.results.labelled import (
-    Variables,
-    error_variables,
-    label,
-    link_coordinates,
-    padded,
-    provenance,
-    with_totals,
-)
-from paraflex.results.links import system_links
 from paraflex.validity import beyond_range, implausible_numbers
+from .acting import load_variables
+from .controllers import with_controllers
+from .findings import keep_findings, validity_variables
+from .kinds import RUN_FIGURES
+from .labelled import Variables, error_variables, label, link_coordinates, padded, provenance, with_totals
+from .links import system_links
 
 
 @checked_arguments()

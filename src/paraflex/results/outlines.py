@@ -9,14 +9,7 @@ import numpy as np
 from paraflex.arrays import Array, Complex, Indices, Numbers
 from paraflex.dynamics import BodyCoordinates, System, across_chord
 from paraflex.fem import slope_square_integrals
-from paraflex.mechanism import (
-    AssumedModesBeam,
-    Body,
-    FlexibleBeam,
-    Mechanism,
-    ModalBody,
-    RigidBody,
-)
+from paraflex.mechanism import AssumedModesBeam, Body, FlexibleBeam, Mechanism, ModalBody, RigidBody
 
 # Number of pieces of a drawn beam, and the fewest between two of its points.
 _BEAM_PIECES, _FEWEST_PIECES = 16, 4

@@ -7,16 +7,14 @@ import numpy as np
 import xarray as xr
 
 from paraflex.arrays import Array
-from paraflex.dynamics import System, closure_of, standing_system, start_state
+from paraflex.dynamics import System, closure_of, moment_signals, reference_pose, standing_system, start_state
 from paraflex.dynamics.projection import joint_gaps, row_unit
 from paraflex.dynamics.rank import joint_of_row
-from paraflex.dynamics.signals import moment_signals
-from paraflex.dynamics.state import reference_pose
 from paraflex.errors import InputError, NumericalError
 from paraflex.kinematics import Path, follow_path
 from paraflex.mechanism import Mechanism, PointRef, Start
-from paraflex.results.acting import first_movements, first_movements_along
-from paraflex.results.drawing import drawing_data, system_drawing
+from .acting import first_movements, first_movements_along
+from .drawing import drawing_data, system_drawing
 
 # Number of poses along a path, which give the length of rails, and of points of the drawn path.
 _POSES, _PLACES = 81, 801

@@ -11,10 +11,10 @@ from paraflex.control.loop.runs import ControlledTracking
 from paraflex.dynamics.points import PointMotion
 from paraflex.findings import Finding
 from paraflex.integrators import IntegrationOptions
-from paraflex.results.kinds import BRAKE_ENERGY, RUN_FIGURES
-from paraflex.results.links import Links, system_links
 from paraflex.tracking import TrackingRun, TrackingTask
 from paraflex.validity import Validity
+from .kinds import BRAKE_ENERGY, RUN_FIGURES
+from .links import Links, system_links
 
 
 @named_in_errors("a record", "what results.record makes of a run")

@@ -10,9 +10,9 @@ import xarray as xr
 
 from paraflex.findings import Finding
 from paraflex.formatting import number, quantity
-from paraflex.results.findings import MODE, keep_findings, verdict_of
-from paraflex.results.following import HEADLINE, ErrorSpan
-from paraflex.results.numbers import finite_or_none
+from .findings import MODE, keep_findings, verdict_of
+from .following import HEADLINE, ErrorSpan
+from .numbers import finite_or_none
 
 if TYPE_CHECKING:
     # The module imports the kernels, which are not needed to read results.

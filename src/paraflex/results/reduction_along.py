@@ -7,13 +7,11 @@ import numpy as np
 
 from paraflex.arrays import Array, Complex, Indices, NDArray
 from paraflex.errors import InputError
-from paraflex.linear.along import PosesAlong
-from paraflex.linear.model import LinearModel
-from paraflex.linear.reduced import ReducedModel, ReductionMethod
-from paraflex.linear.reduction import reduce
+from paraflex.linear import LinearModel, PosesAlong, ReducedModel, reduce
+from paraflex.linear.reduced import ReductionMethod
 from paraflex.linear.states_needed import DAMPING
-from paraflex.results.linear_data import motors_of
-from paraflex.results.reduction_summary import ONE, OWN, STATIC
+from .linear_data import motors_of
+from .reduction_summary import ONE, OWN, STATIC
 
 # Numbers of poses between which bases are interpolated: each halves the distances, until errors are below the limit.
 _COUNTS = (2, 3, 5, 9, 17, 33)

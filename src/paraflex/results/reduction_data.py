@@ -9,16 +9,15 @@ import xarray as xr
 from paraflex.arguments import checked_arguments
 from paraflex.arrays import Array, Indices
 from paraflex.errors import InputError
-from paraflex.linear.along import PosesAlong
-from paraflex.linear.model import LinearModel
-from paraflex.linear.reduced import ReducedModel, ReductionMethod
-from paraflex.linear.reduction import CARRIED, reduce
-from paraflex.linear.states_needed import DAMPING, states_needed
-from paraflex.results.linear_data import motors_of
-from paraflex.results.linear_summary import HOLDINGS
-from paraflex.results.reduction_along import UNITS_ALONG, along_variables, output_errors
-from paraflex.results.reduction_summary import FULL
-from paraflex.results.storage import origin
+from paraflex.linear import LinearModel, PosesAlong, ReducedModel, reduce, states_needed
+from paraflex.linear.reduced import ReductionMethod
+from paraflex.linear.reduction import CARRIED
+from paraflex.linear.states_needed import DAMPING
+from .linear_data import motors_of
+from .linear_summary import HOLDINGS
+from .reduction_along import UNITS_ALONG, along_variables, output_errors
+from .reduction_summary import FULL
+from .storage import origin
 
 # Number of frequencies of responses, and lowest and highest one relative to `until`.
 _FREQUENCIES, _LOWEST, _BEYOND = 400, 1e-2, 2.5

@@ -8,9 +8,9 @@ import xarray as xr
 
 from paraflex.arguments import checked_arguments
 from paraflex.arrays import Array
-from paraflex.results.kinds import check_kind
-from paraflex.results.linear_summary import HOLDINGS
-from paraflex.results.numbers import by_label, finite_or_none
+from .kinds import check_kind
+from .linear_summary import HOLDINGS
+from .numbers import by_label, finite_or_none
 
 FULL = "full"
 OWN, ONE = "of each pose", "of one pose"

@@ -1,7 +1,5 @@
 """Traces of a run for metrics, computed without a dataset, which would take longer than all metrics."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -13,24 +11,18 @@ from paraflex.control.laws.joints import internal_torques
 from paraflex.control.loop.run_loop import ControllerRecord
 from paraflex.control.loop.runs import ControlledMotion, ControlledTracking
 from paraflex.dynamics import System, joint_coordinate
-from paraflex.dynamics.joint_loads import (
-    LoadComponents,
-    drive_torques,
-    joint_loads,
-    load_errors,
-    undetermined_loads,
-)
+from paraflex.dynamics.joint_loads import LoadComponents, drive_torques, joint_loads, load_errors, undetermined_loads
 from paraflex.equilibria.conditions import Coordinate
 from paraflex.equilibria.result import Statics
 from paraflex.integrators import Solution
 from paraflex.motion import MotionRun
-from paraflex.results.formulas import length
-from paraflex.results.numbers import stacked
-from paraflex.results.outlines import deflections
-from paraflex.results.stress import SectionResult, section_result
-from paraflex.results.traces import Trace, Traces
 from paraflex.tracking import TrackingRun
 from paraflex.validity import Validity
+from .formulas import length
+from .numbers import stacked
+from .outlines import deflections
+from .stress import SectionResult, section_result
+from .traces import Trace, Traces
 
 R = TypeVar("R", TrackingRun, MotionRun, Statics)
 

@@ -2,7 +2,7 @@
 
 import xarray as xr
 
-from paraflex.results.numbers import largest, units_of_each
+from .numbers import largest, units_of_each
 
 READING, SENSOR = "sensor_reading", "sensor"
 

@@ -10,16 +10,16 @@ import xarray as xr
 from paraflex.arguments import checked_arguments
 from paraflex.equilibria import Statics
 from paraflex.findings import Finding
-from paraflex.results.drawing import system_drawing
-from paraflex.results.findings import keep_findings, validity_summary, validity_variables, verdict_of
-from paraflex.results.kinds import check_kind
-from paraflex.results.labelled import label, link_coordinates, with_totals
-from paraflex.results.links import system_links
-from paraflex.results.numbers import by_label, finite_or_none, name_units, single, stacked
-from paraflex.results.run_traces import StaticsTraces
-from paraflex.results.statics_steps import NAMED_UNITS
-from paraflex.results.storage import origin
 from paraflex.validity import beyond_range, implausible_numbers
+from .drawing import system_drawing
+from .findings import keep_findings, validity_summary, validity_variables, verdict_of
+from .kinds import check_kind
+from .labelled import label, link_coordinates, with_totals
+from .links import system_links
+from .numbers import by_label, finite_or_none, name_units, single, stacked
+from .run_traces import StaticsTraces
+from .statics_steps import NAMED_UNITS
+from .storage import origin
 
 # Number of frequencies kept for each step.
 _FREQUENCIES = 8

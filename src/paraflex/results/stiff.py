@@ -11,14 +11,13 @@ from collections.abc import Callable, Mapping, Sequence
 import numpy as np
 
 from paraflex.arrays import Array, Mask
-from paraflex.dynamics import System, build_system
-from paraflex.dynamics.joint_coordinates import joint_coordinate
+from paraflex.dynamics import System, build_system, joint_coordinate
 from paraflex.dynamics.signals import no_signals
 from paraflex.errors import InputError, NumericalError
 from paraflex.kernel.constraints import constraint_values, fill_jacobian
 from paraflex.kernel.packed import make_scratch
 from paraflex.mechanism import Mechanism
-from paraflex.results.outlines import Outline
+from .outlines import Outline
 
 _MOST_STEPS = 8
 # Gap below which joints are closed, far below the rounding of stored positions [sizes of the mechanism, rad].

@@ -13,9 +13,9 @@ from paraflex.arguments import checked_arguments
 from paraflex.errors import suggestion
 from paraflex.folders import DATA_FILES, check_listed
 from paraflex.interrupts import uninterrupted
-from paraflex.results.following import metric_variables
 from paraflex.seals import NETCDF, PARQUET, check_regular, check_seal, damaged, unreadable, wrong_file
 from paraflex.writing import sealed_file
+from .following import metric_variables
 
 # Version of the contents of datasets; all versions are readable. 2: shapes and other variables of drawings. 3: errors
 # during the motion and after it, vibration about the drift, deflections from the chord, total joint forces (before,

@@ -8,8 +8,8 @@ import numpy as np
 from paraflex.arrays import Array, NDArray
 from paraflex.dynamics import System
 from paraflex.dynamics.sections import SectionLoads, Sections, sections_of
-from paraflex.results.beam_stresses import CONTACT, SECTION
-from paraflex.results.numbers import single
+from .beam_stresses import CONTACT, SECTION
+from .numbers import single
 
 # Dimensions besides time, and values at the samples reached, by name of the variable.
 Variables = dict[str, tuple[tuple[str, ...], NDArray[np.floating]]]

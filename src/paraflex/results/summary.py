@@ -7,16 +7,16 @@ import numpy as np
 import xarray as xr
 
 from paraflex.arguments import checked_arguments
-from paraflex.results.controllers import controller_figures
-from paraflex.results.findings import validity_summary, verdict_of
-from paraflex.results.following import FOLLOWING, ErrorSpan, part_run
-from paraflex.results.kinds import RUN_FIGURES, check_kind
-from paraflex.results.loads import load_figures
-from paraflex.results.metrics import METRICS
-from paraflex.results.numbers import by_label, finite_or_none, plain
-from paraflex.results.reduced_runs import reduced_run_figures
-from paraflex.results.sensors import sensor_figures
-from paraflex.results.traces import data_traces
+from .controllers import controller_figures
+from .findings import validity_summary, verdict_of
+from .following import FOLLOWING, ErrorSpan, part_run
+from .kinds import RUN_FIGURES, check_kind
+from .loads import load_figures
+from .metrics import METRICS
+from .numbers import by_label, finite_or_none, plain
+from .reduced_runs import reduced_run_figures
+from .sensors import sensor_figures
+from .traces import data_traces
 
 _FIGURES = (
     *FOLLOWING,

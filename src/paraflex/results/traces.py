@@ -8,7 +8,7 @@ import numpy as np
 import xarray as xr
 
 from paraflex.arrays import Mask, NDArray
-from paraflex.results.formulas import during_motion, length
+from .formulas import during_motion, length
 
 # Real for a run, complex for a run with a complex step.
 Trace = NDArray[Any]

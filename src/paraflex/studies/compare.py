@@ -15,8 +15,8 @@ from paraflex.campaign import OnProgress, Progress, Result, WholeStudy, Workers,
 from paraflex.errors import InputError, IntegrationError, NumericalError
 from paraflex.integrators import METHODS, IntegrationOptions, Solution
 from paraflex.integrators.methods import Family, Method, find_method
-from paraflex.studies.cases import Case
-from paraflex.studies.comparison import Measurement, MethodComparison, Reference
+from .cases import Case
+from .comparison import Measurement, MethodComparison, Reference
 
 # The reference run uses the tightest tolerance divided by the first number, its check run twice that tolerance. Their
 # time limit is that of a run times the second number.

@@ -12,13 +12,13 @@ from paraflex.late import view
 from paraflex.results import summary
 from paraflex.results.findings import finding_lines, validity_line, verdict_of
 from paraflex.results.following import HEADLINE, SPAN_WORDS, ErrorSpan
-from paraflex.studies.agreement import Verification
-from paraflex.studies.comparison import MethodComparison
-from paraflex.studies.law_comparison import LawComparison
-from paraflex.studies.optimisation.indices import IndicesResult
-from paraflex.studies.optimisation.result import SearchResult
-from paraflex.studies.sensitivities.study import Sensitivities
-from paraflex.studies.tracking import StudyResult
+from .agreement import Verification
+from .comparison import MethodComparison
+from .law_comparison import LawComparison
+from .optimisation.indices import IndicesResult
+from .optimisation.result import SearchResult
+from .sensitivities.study import Sensitivities
+from .tracking import StudyResult
 
 
 @view.register(StudyResult)

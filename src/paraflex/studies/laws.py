@@ -23,8 +23,8 @@ from paraflex.reduced_bodies import reduced_mechanism
 from paraflex.results.following import HEADLINE, ErrorSpan
 from paraflex.results.labelled import provenance
 from paraflex.results.metrics import METRICS
-from paraflex.studies.law_comparison import OPEN_LOOP, LawComparison, law_dataset
 from paraflex.tracking import TrackingTask
+from .law_comparison import OPEN_LOOP, LawComparison, law_dataset
 
 # Separator of the names of controllers that act together.
 _AND = "+"

@@ -24,8 +24,8 @@ from paraflex.mechanism import (
 )
 from paraflex.results.following import ErrorSpan
 from paraflex.results.record import Record, record
-from paraflex.studies.agreement import ModelRuns, Refinement, Verification
 from paraflex.tracking import TrackingTask, simulate
+from .agreement import ModelRuns, Refinement, Verification
 
 FIDELITIES = ("rigid", "ked", "linear", "second-order", "segments")
 

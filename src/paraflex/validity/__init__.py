@@ -10,9 +10,9 @@ from paraflex.dynamics import System
 from paraflex.errors import ValidityWarning
 from paraflex.findings import Finding, warn_of
 from paraflex.integrators import Solution
-from paraflex.validity.bending import bending_of
-from paraflex.validity.causes import likely_cause as likely_cause, with_likely_cause as with_likely_cause
-from paraflex.validity.indicators import (
+from .bending import bending_of
+from .causes import likely_cause as likely_cause, with_likely_cause as with_likely_cause
+from .indicators import (
     AXIAL_LIMIT as AXIAL_LIMIT,
     DRIVEN_AXIAL_LIMIT as DRIVEN_AXIAL_LIMIT,
     FOURTH_ORDER_LIMIT as FOURTH_ORDER_LIMIT,
@@ -24,8 +24,8 @@ from paraflex.validity.indicators import (
     of_linear,
     of_second_order,
 )
-from paraflex.validity.numbers import implausible_numbers as implausible_numbers, mechanism_size as mechanism_size
-from paraflex.validity.plausibility import (
+from .numbers import implausible_numbers as implausible_numbers, mechanism_size as mechanism_size
+from .plausibility import (
     Driven as Driven,
     implausible_results as implausible_results,
     implausible_stresses as implausible_stresses,

@@ -7,7 +7,7 @@ from paraflex.errors import IntegrationError, SliderOffBeamError
 from paraflex.findings import Finding
 from paraflex.integrators import Solution
 from paraflex.mechanism import Mechanism
-from paraflex.validity.numbers import implausible_numbers
+from .numbers import implausible_numbers
 
 # Codes of findings about numbers that make motions impossible; other doubtful numbers do not make a run fail.
 _CODES = ("modulus", "density", "material", "mass", "beam-thin", "beam-thick", "section-turned", "size", "angle")

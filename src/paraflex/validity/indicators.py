@@ -12,7 +12,7 @@ import numpy as np
 from paraflex.arrays import Array
 from paraflex.integrators import Solution
 from paraflex.mechanism import Geometry
-from paraflex.validity.bending import Bending
+from .bending import Bending
 
 Number = TypeVar("Number", float, Array)
 

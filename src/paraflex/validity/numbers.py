@@ -16,7 +16,7 @@ from paraflex.mechanism import AssumedModesBeam, FlexibleBeam, Mechanism, ModalB
 from paraflex.mechanism.bodies import Body, Material
 from paraflex.mechanism.poses import local_points
 from paraflex.mechanism.tracks import longest_element, too_long, tracks
-from paraflex.validity.actions import implausible_actions
+from .actions import implausible_actions
 
 Place = tuple[float, float]
 Beam = FlexibleBeam | AssumedModesBeam

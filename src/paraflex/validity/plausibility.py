@@ -19,9 +19,9 @@ from paraflex.integrators import METHODS, IntegrationOptions, Solution
 from paraflex.integrators.method import NativeMethod
 from paraflex.mechanism import Assembly, Mechanism, PointForce, approximate_poses, grouped
 from paraflex.units import STRESS
-from paraflex.validity.bending import bending_of
-from paraflex.validity.causes import cause_among
-from paraflex.validity.numbers import FAST, STANDARD_GRAVITY, implausible_numbers, mechanism_size
+from .bending import bending_of
+from .causes import cause_among
+from .numbers import FAST, STANDARD_GRAVITY, implausible_numbers, mechanism_size
 
 # Energy error relative to the largest energy: the library's runs have up to 3e-4 with the default tolerance. Energies
 # below the second fraction of weight times size count as zero.

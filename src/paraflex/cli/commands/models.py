@@ -3,8 +3,8 @@
 from dataclasses import dataclass, field
 from typing import ClassVar
 
-from paraflex.cli.commands.options import FilesChoice, ModelChoice, assembly_option, json_switch, path_option
-from paraflex.cli.commands.requests import argument, option, repeatable, switch
+from .options import FilesChoice, ModelChoice, assembly_option, json_switch, path_option
+from .requests import argument, option, repeatable, switch
 
 
 @dataclass(frozen=True)

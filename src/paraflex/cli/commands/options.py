@@ -6,8 +6,8 @@ from dataclasses import dataclass, field
 from functools import partial
 from typing import TYPE_CHECKING
 
-from paraflex.cli.commands.requests import FieldMaker, argument, option, repeatable, switch
 from paraflex.errors import InputError
+from .requests import FieldMaker, argument, option, repeatable, switch
 
 if TYPE_CHECKING:
     from paraflex.campaign import Workers

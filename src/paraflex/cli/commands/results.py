@@ -3,7 +3,7 @@
 from dataclasses import MISSING, dataclass
 from functools import partial
 
-from paraflex.cli.commands.requests import argument, option, repeatable, switch
+from .requests import argument, option, repeatable, switch
 
 _results = partial(argument, "RESULTS", "A folder or file that paraflex wrote.")
 _overwrite = partial(switch, "--force", "Overwrite existing files.")

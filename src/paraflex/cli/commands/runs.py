@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, field
 
-from paraflex.cli.commands.options import (
+from .options import (
     DrawnChoice,
     FramesChoice,
     ModelChoice,
@@ -13,7 +13,7 @@ from paraflex.cli.commands.options import (
     replace_switch,
     tolerance_option,
 )
-from paraflex.cli.commands.requests import option, repeatable, switch
+from .requests import option, repeatable, switch
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -9,8 +9,8 @@ from typing import Any, NamedTuple
 
 import typer
 
-from paraflex.cli.commands import models, results, runs, studies
 from paraflex.cli.signals import exit_code, is_taken, raised
+from . import models, results, runs, studies
 
 
 class ListedCommand(NamedTuple):

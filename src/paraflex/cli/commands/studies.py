@@ -3,14 +3,8 @@
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from paraflex.cli.commands.options import (
-    WorkersChoice,
-    json_switch,
-    outside_switch,
-    replace_switch,
-    report_switch,
-)
-from paraflex.cli.commands.requests import argument, option, repeatable
+from .options import WorkersChoice, json_switch, outside_switch, replace_switch, report_switch
+from .requests import argument, option, repeatable
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -13,12 +13,12 @@ import scipy
 
 from paraflex.arguments import checked_arguments
 from paraflex.arrays import Array, ArrayLike, Complex
-from paraflex.control.design.controllability import frequency_of
-from paraflex.control.design.sampled import SampledPlant, WithPoles, as_sampled, discretise, places
 from paraflex.control.laws.discrete import DiscreteModel, check_discrete, is_model, matrices_of
 from paraflex.dynamics.state_space import StateSpace
 from paraflex.errors import InputError, ResultWarning, warn_user, within
 from paraflex.linear.named import places_in_s
+from .controllability import frequency_of
+from .sampled import SampledPlant, WithPoles, as_sampled, discretise, places
 
 if TYPE_CHECKING:
     import pandas as pd

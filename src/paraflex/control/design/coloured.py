@@ -7,11 +7,11 @@ import numpy as np
 import scipy
 
 from paraflex.arrays import Array
-from paraflex.control.design.sampled import NamedMatrices, SampledPlant, as_sampled, discretise, named_matrices
 from paraflex.control.loop.filters import transfer_function
 from paraflex.dynamics.state_space import StateSpace
 from paraflex.errors import InputError
 from paraflex.mechanism.quantities import all_known, positive
+from .sampled import NamedMatrices, SampledPlant, as_sampled, discretise, named_matrices
 
 # Names of the noise inputs of the filters.
 _NOISE = "{} noise".format

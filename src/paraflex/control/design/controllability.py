@@ -4,8 +4,8 @@ import numpy as np
 import scipy
 
 from paraflex.arrays import Array
-from paraflex.control.design.sampled import SampledPlant
 from paraflex.errors import InputError
+from .sampled import SampledPlant
 
 # Poles further inside the unit circle than this decay without control.
 _ON_CIRCLE = 1e-9

@@ -11,7 +11,7 @@ import scipy
 
 from paraflex.arguments import checked_arguments
 from paraflex.arrays import Array, Complex
-from paraflex.control.design.closed_loops import ClosedLoop, closed_loop, warn_if_unstable
+from .closed_loops import ClosedLoop, closed_loop, warn_if_unstable
 
 if TYPE_CHECKING:
     import pandas as pd

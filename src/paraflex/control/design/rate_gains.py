@@ -9,14 +9,14 @@ import scipy
 
 from paraflex.arguments import checked_arguments
 from paraflex.arrays import Array, Complex
-from paraflex.control.design.closed_loops import ClosedLoop, closed_loop, damped_frequency, named_law
-from paraflex.control.design.sampled import SampledPlant, as_sampled
 from paraflex.control.laws.discrete import side_by_side
 from paraflex.control.laws.kinds.rate_feedback import RateFeedback
 from paraflex.errors import InputError
 from paraflex.linear import LinearModel, ReducedModel
 from paraflex.mechanism import Mechanism
 from paraflex.mechanism.quantities import known, positive
+from .closed_loops import ClosedLoop, closed_loop, damped_frequency, named_law
+from .sampled import SampledPlant, as_sampled
 
 # A pole within this distance of z = 1 belongs to a free motion, which strain feedback does not affect.
 _FREE = 1e-5

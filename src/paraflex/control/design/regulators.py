@@ -8,15 +8,15 @@ import scipy
 
 from paraflex.arguments import checked_arguments, numbers_in
 from paraflex.arrays import Array, ArrayLike
-from paraflex.control.design.coloured import disturbed_plant
-from paraflex.control.design.controllability import check_controllable
-from paraflex.control.design.sampled import SampledPlant, as_sampled, places
 from paraflex.control.laws.estimators import kalman_filter, riccati
 from paraflex.control.laws.lqg_law import LQGDesign, Regulator
 from paraflex.control.loop.together import numbers_by_name
 from paraflex.errors import InputError
 from paraflex.linear import LinearModel
 from paraflex.mechanism.quantities import not_negative
+from .coloured import disturbed_plant
+from .controllability import check_controllable
+from .sampled import SampledPlant, as_sampled, places
 
 # Default standard deviation of random torques, as a fraction of the largest torques.
 _OF_EFFORT = 0.1

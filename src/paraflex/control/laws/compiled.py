@@ -14,9 +14,9 @@ from numba.extending import is_jitted
 from numba.np.numpy_support import carray
 
 from paraflex.arrays import Array
-from paraflex.control.laws.controllers import Plant
-from paraflex.control.laws.law import Law, StartedLaw
 from paraflex.errors import InputError
+from .controllers import Plant
+from .law import Law, StartedLaw
 
 MOST_STATES = 100_000
 

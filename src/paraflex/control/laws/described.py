@@ -7,14 +7,14 @@ from dataclasses import dataclass, fields
 from typing import TYPE_CHECKING, Any
 
 from paraflex.arguments import CheckedFields, named_in_errors
-from paraflex.control.laws.kinds import LAWS
-from paraflex.control.laws.law import Law, given, of_names
 from paraflex.control.loop.together import Numbers, check_distinct, check_name, check_whole, multiple_of
 from paraflex.errors import InputError, renamed, within
 from paraflex.mechanism import Mechanism
 from paraflex.mechanism.loads import InTime
 from paraflex.mechanism.measured import encoders_of, measured_sensors
 from paraflex.mechanism.quantities import all_known
+from .kinds import LAWS
+from .law import Law, given, of_names
 
 if TYPE_CHECKING:
     from paraflex.control.loop.chain import SampledController

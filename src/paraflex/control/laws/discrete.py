@@ -8,12 +8,12 @@ import numpy as np
 import scipy
 
 from paraflex.arrays import Array
-from paraflex.control.laws.controllers import Plant
-from paraflex.control.laws.law import Law
-from paraflex.control.laws.linear_law import LinearLaw
 from paraflex.control.loop.together import same_period
 from paraflex.dynamics.state_space import StateSpace
 from paraflex.errors import InputError
+from .controllers import Plant
+from .law import Law
+from .linear_law import LinearLaw
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,9 +9,9 @@ import scipy
 
 from paraflex.arguments import checked_arguments
 from paraflex.arrays import Array, Complex
-from paraflex.control.laws.linear_law import LinearLaw
 from paraflex.errors import InputError
 from paraflex.mechanism.quantities import positive
+from .linear_law import LinearLaw
 
 
 @checked_arguments()

@@ -11,11 +11,11 @@ import numpy as np
 
 from paraflex.arguments import CheckedFields, named_in_errors
 from paraflex.arrays import Array
-from paraflex.control.laws.controllers import Plant
 from paraflex.errors import InputError
 from paraflex.mechanism import Mechanism
 from paraflex.mechanism.measured import encoders_of, measured_sensors
 from paraflex.mechanism.quantities import all_known, field_metadata
+from .controllers import Plant
 
 # Kinds of control laws by their names in files; `kinds` imports the modules that define those of paraflex.
 LAWS: dict[str, type[Law]] = {}

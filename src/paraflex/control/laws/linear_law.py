@@ -6,7 +6,7 @@ from typing import NamedTuple
 import numpy as np
 
 from paraflex.arrays import Array
-from paraflex.control.laws.law import StartedLaw
+from .law import StartedLaw
 
 
 def _zero() -> Array:

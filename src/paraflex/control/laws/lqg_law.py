@@ -7,12 +7,12 @@ import numpy as np
 
 from paraflex.arrays import Array, Complex
 from paraflex.control.design.sampled import SampledPlant, WithPoles
-from paraflex.control.laws.controllers import Plant
-from paraflex.control.laws.estimators import KalmanFilter
-from paraflex.control.laws.linear_law import LinearLaw, LinearState
 from paraflex.control.loop.together import SAME
 from paraflex.dynamics.state_space import StateSpace
 from paraflex.errors import InputError
+from .controllers import Plant
+from .estimators import KalmanFilter
+from .linear_law import LinearLaw, LinearState
 
 
 @dataclass(frozen=True)

@@ -20,15 +20,15 @@ from paraflex.control.laws.controllers import Plant
 from paraflex.control.laws.discrete import DiscreteModel, check_discrete, is_model, matrices_of
 from paraflex.control.laws.estimators import rounded
 from paraflex.control.laws.law import Law, StartedLaw
-from paraflex.control.loop.amplifiers import largest_commands
-from paraflex.control.loop.filters import transfer_function
-from paraflex.control.loop.references import Reference, references
-from paraflex.control.loop.together import by_name, checked_number, is_number, real_numbers
 from paraflex.dynamics.state_space import StateSpace
 from paraflex.errors import InputError
 from paraflex.mechanism.quantities import not_negative
 from paraflex.motion import MotionRun
 from paraflex.tracking import TrackingRun
+from .amplifiers import largest_commands
+from .filters import transfer_function
+from .references import Reference, references
+from .together import by_name, checked_number, is_number, real_numbers
 
 # Attributes of a `SampledController` that hold its state: a law may step itself.
 CHANGING = ("law", "started", "chain_state")

@@ -7,15 +7,15 @@ import numpy as np
 
 from paraflex.actuation import FeedForward
 from paraflex.arrays import Array
-from paraflex.control.loop.amplifiers import Amplifiers, padded_signal, relaxing
-from paraflex.control.loop.runs import TorqueLog
-from paraflex.control.loop.together import real_numbers
 from paraflex.dynamics import InputSignals, State, System, constant_signals, pack_signals
 from paraflex.errors import InputError
 from paraflex.kernel.packed import Signals
 from paraflex.mechanism import Mechanism
 from paraflex.mechanism.quantities import all_known
 from paraflex.tracking import path_stops
+from .amplifiers import Amplifiers, padded_signal, relaxing
+from .runs import TorqueLog
+from .together import real_numbers
 
 Torques = Sequence[float] | Mapping[str, float] | Array
 

@@ -10,12 +10,12 @@ from paraflex.control.laws.compiled import CompiledInRun
 from paraflex.control.laws.controllers import Plant
 from paraflex.control.laws.discrete import DiscreteModel
 from paraflex.control.laws.linear_law import LinearLaw
-from paraflex.control.loop.chain import SampledController
-from paraflex.control.loop.readings import Readings
-from paraflex.control.loop.references import AtSamples
-from paraflex.control.loop.together import SAME, periods_in, whole_and_part
 from paraflex.kernel.arrays import apart
 from paraflex.kernel.sampled import SAMPLED, SampledLaw
+from .chain import SampledController
+from .readings import Readings
+from .references import AtSamples
+from .together import SAME, periods_in, whole_and_part
 
 _MATRICES = ("A", "B", "C", "D", "E", "first", "holding", "waiting")
 

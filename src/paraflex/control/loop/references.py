@@ -9,7 +9,6 @@ import numpy as np
 from paraflex.actuation import required_effort
 from paraflex.arrays import Array
 from paraflex.control.laws.controllers import Plant
-from paraflex.control.loop.together import OPEN_LOOP, PLAN
 from paraflex.dynamics.sensors import SensorReader
 from paraflex.errors import InputError
 from paraflex.kinematics import RigidMotion
@@ -18,6 +17,7 @@ from paraflex.mechanism.measured import measured_sensors
 from paraflex.mechanism.quantities import all_known
 from paraflex.motion import MotionRun
 from paraflex.tracking import TrackingRun
+from .together import OPEN_LOOP, PLAN
 
 Reference = Callable[[float], float]
 

@@ -10,20 +10,12 @@ import numpy as np
 from paraflex.arrays import Array
 from paraflex.control.laws.controllers import Controller, Plant
 from paraflex.control.laws.discrete import DiscreteModel
-from paraflex.control.loop.chain import CHANGING, ChainSample, SampledController, as_law
-from paraflex.control.loop.inside import exception_of, linear_model
-from paraflex.control.loop.together import (
-    check_distinct,
-    check_name,
-    check_whole,
-    checked_number,
-    multiple_of,
-    real_numbers,
-    whole_and_part,
-)
 from paraflex.errors import InputError
 from paraflex.kernel.sampled import ACTED, RAISED, SAMPLED, WRONG, SampledLaw
 from paraflex.mechanism.quantities import not_negative
+from .chain import CHANGING, ChainSample, SampledController, as_law
+from .inside import exception_of, linear_model
+from .together import check_distinct, check_name, check_whole, checked_number, multiple_of, real_numbers, whole_and_part
 
 
 class PendingTorques(NamedTuple):

@@ -11,13 +11,13 @@ from paraflex.arguments import named_in_errors
 from paraflex.arrays import Array, Indices
 from paraflex.control.design.closed_loops import closed_loop, poles_beyond, unstable_poles
 from paraflex.control.laws.discrete import side_by_side
-from paraflex.control.loop.run_loop import ControllerRecord
-from paraflex.control.loop.together import same_period, whole_and_part
 from paraflex.errors import ParaflexError
 from paraflex.findings import Finding
 from paraflex.linear import linearise
 from paraflex.motion import MotionRun
 from paraflex.tracking import TrackingRun
+from .run_loop import ControllerRecord
+from .together import same_period, whole_and_part
 
 # Growth below this factor over the whole run is not reported, as rigid motions that no motor controls drift anyway. A
 # run counts as at least this many samples.

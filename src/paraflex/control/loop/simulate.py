@@ -4,13 +4,13 @@ from collections.abc import Callable, Sequence
 from typing import Any
 
 from paraflex.control.laws.described import TABLE, ControllerDescription
-from paraflex.control.loop.runs import ControlledMotion, ControlledTracking
-from paraflex.control.loop.simulation import Simulation
 from paraflex.dynamics import State
 from paraflex.errors import InputError
 from paraflex.integrators import IntegrationOptions
 from paraflex.mechanism import ActuationMode, Mechanism
 from paraflex.tracking import TrackingTask
+from .runs import ControlledMotion, ControlledTracking
+from .simulation import Simulation
 
 OnTime = Callable[[float], None]
 

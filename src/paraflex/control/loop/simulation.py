@@ -14,12 +14,6 @@ from paraflex.arguments import checked_arguments, named_in_errors
 from paraflex.arrays import Array
 from paraflex.control.laws.controllers import Controller, Plant
 from paraflex.control.laws.described import ControllerDescription
-from paraflex.control.loop.held import HeldTorques, Torques
-from paraflex.control.loop.inside import sampled_law
-from paraflex.control.loop.readings import Readings
-from paraflex.control.loop.run_loop import LawFailure, Loop
-from paraflex.control.loop.runs import ControlledMotion, ControlledTracking, TorqueLog
-from paraflex.control.loop.together import SAME, is_number
 from paraflex.dynamics import State, System
 from paraflex.errors import ControllerError, InputError, IntegrationError, Moment, ResultWarning
 from paraflex.findings import warn_of
@@ -33,6 +27,12 @@ from paraflex.mechanism.quantities import finite
 from paraflex.motion import motion_start
 from paraflex.tracking import Ending, TrackingTask
 from paraflex.validity import warn, with_likely_cause
+from .held import HeldTorques, Torques
+from .inside import sampled_law
+from .readings import Readings
+from .run_loop import LawFailure, Loop
+from .runs import ControlledMotion, ControlledTracking, TorqueLog
+from .together import SAME, is_number
 
 # Samples within this fraction of the run after a change of torques show the state just before it.
 _ROUNDING = 1e-12

@@ -8,11 +8,11 @@ import numpy as np
 from paraflex.actuation import FeedForward, TorquePlan, plan_torques, required_effort
 from paraflex.arguments import CheckedFields, checked_arguments
 from paraflex.arrays import Array
-from paraflex.control.shaping.shapers import Shaper
 from paraflex.errors import InputError
 from paraflex.kinematics import Path, PathFollower, PathMotion, turning_of
 from paraflex.mechanism import ActuationMode
 from paraflex.tracking import TrackingTask, path_knots
+from .shapers import Shaper
 
 # A run may end before the shaped torques do by this fraction of their duration, a rounding error.
 _SAME_END = 1e-9

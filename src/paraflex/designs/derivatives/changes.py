@@ -12,9 +12,6 @@ from paraflex.actuation.feed_forward import splines
 from paraflex.arguments import with_fields
 from paraflex.arrays import Array, Numbers
 from paraflex.control.shaping.shaped import ShapedPath
-from paraflex.designs.derivatives.plans import RunInputs
-from paraflex.designs.derivatives.stencil import STENCILS, Difference, Stencil
-from paraflex.designs.derivatives.steps import Stepped, another_layout, complex_step, part, stepped
 from paraflex.designs.run import Task
 from paraflex.designs.setting import Setting
 from paraflex.dynamics import (
@@ -39,6 +36,9 @@ from paraflex.kinematics.paths import KnownPath
 from paraflex.kinematics.sensitivity import DisplacedClosure, MotionChange, motion_sensitivity
 from paraflex.mechanism import ActuationMode, FlexibleBeam, Mechanism, RigidBody, with_actuators
 from paraflex.tracking import TrackingTask, path_knots
+from .plans import RunInputs
+from .stencil import STENCILS, Difference, Stencil
+from .steps import Stepped, another_layout, complex_step, part, stepped
 
 
 class DescribedInputs(NamedTuple):

@@ -7,10 +7,6 @@ from typing import Any
 import numpy as np
 
 from paraflex.arrays import Array
-from paraflex.designs.derivatives.changes import Change, ModeChange
-from paraflex.designs.derivatives.plans import RunInputs, check_has_path, check_open_and_whole, run_inputs, size_of
-from paraflex.designs.derivatives.stencil import STENCILS
-from paraflex.designs.derivatives.steps import part, stepped
 from paraflex.designs.measure import measure, metric_columns, metric_values, smooth_metrics
 from paraflex.designs.run import Task, plan_task
 from paraflex.designs.setting import Setting
@@ -27,6 +23,10 @@ from paraflex.integrators.sensitivity import (
 from paraflex.integrators.solution import Solution
 from paraflex.results.run_traces import RunTraces, run_traces
 from paraflex.tracking import TrackingRun, simulate
+from .changes import Change, ModeChange
+from .plans import RunInputs, check_has_path, check_open_and_whole, run_inputs, size_of
+from .stencil import STENCILS
+from .steps import part, stepped
 
 
 @dataclass(frozen=True)

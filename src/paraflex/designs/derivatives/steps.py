@@ -13,8 +13,8 @@ import numpy as np
 
 from paraflex.arguments import with_fields
 from paraflex.arrays import Array, Numbers
-from paraflex.designs.derivatives.stencil import Stencil
 from paraflex.errors import InputError
+from .stencil import Stencil
 
 T = TypeVar("T")
 

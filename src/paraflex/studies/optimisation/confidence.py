@@ -10,10 +10,10 @@ import numpy as np
 from paraflex.arrays import Array
 from paraflex.campaign.study import Result
 from paraflex.results.numbers import finite_or_none
-from paraflex.studies.optimisation.evaluate import EvaluatedDesign
-from paraflex.studies.optimisation.fit import residuals
-from paraflex.studies.optimisation.objective import Target
-from paraflex.studies.optimisation.study import DesignStudy
+from .evaluate import EvaluatedDesign
+from .fit import residuals
+from .objective import Target
+from .study import DesignStudy
 
 # Condition number of the Jacobian, with parameters as fractions of their ranges, above which its weakest direction is
 # undetermined.

@@ -10,11 +10,10 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from paraflex.arrays import Array
-from paraflex.campaign import Engine, Journal, LostWorker, Row, checked_rows, outcomes
-from paraflex.campaign.study import Result
+from paraflex.campaign import Engine, Journal, LostWorker, Result, Row, checked_rows, outcomes
 from paraflex.designs.run import STATUS_COMPLETE, Outcome, RunTask, Task, lost, run_id, run_task
 from paraflex.designs.setting import Setting
-from paraflex.studies.optimisation.study import DesignStudy
+from .study import DesignStudy
 
 Design = tuple[float, ...]
 

@@ -5,9 +5,9 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from paraflex.arrays import Array
-from paraflex.studies.optimisation.evaluate import Evaluate, EvaluatedDesign
-from paraflex.studies.optimisation.objective import Target
-from paraflex.studies.optimisation.slopes import Slopes
+from .evaluate import Evaluate, EvaluatedDesign
+from .objective import Target
+from .slopes import Slopes
 
 # Default tolerance of the fit: relative change of the cost and of the parameters, and norm of the gradient.
 _FIT_TOLERANCE = 1e-6

@@ -10,16 +10,16 @@ from paraflex.designs.run import RunTask
 from paraflex.designs.schema import study_table
 from paraflex.designs.units import check_unit_of_metric
 from paraflex.errors import InputError, suggestion
-from paraflex.studies.optimisation.confidence import Confidence, checked, confidence
-from paraflex.studies.optimisation.evaluate import Evaluate, EvaluatedDesign, LimitReached, Session
-from paraflex.studies.optimisation.fit import closest, fit, residual_slopes, root_mean_square
-from paraflex.studies.optimisation.objective import Target
-from paraflex.studies.optimisation.problem import running_start
-from paraflex.studies.optimisation.result import SearchResult, at_bounds, of_session
-from paraflex.studies.optimisation.schema import StudyTable, TargetTable
-from paraflex.studies.optimisation.session import SearchStudy, Solver, sampled_start
-from paraflex.studies.optimisation.slopes import ExactSlopes, no_exact_slopes, slopes_of
-from paraflex.studies.optimisation.study import SweepStudy, base_study, read_search
+from .confidence import Confidence, checked, confidence
+from .evaluate import Evaluate, EvaluatedDesign, LimitReached, Session
+from .fit import closest, fit, residual_slopes, root_mean_square
+from .objective import Target
+from .problem import running_start
+from .result import SearchResult, at_bounds, of_session
+from .schema import StudyTable, TargetTable
+from .session import SearchStudy, Solver, sampled_start
+from .slopes import ExactSlopes, no_exact_slopes, slopes_of
+from .study import SweepStudy, base_study, read_search
 
 
 @dataclass(frozen=True)

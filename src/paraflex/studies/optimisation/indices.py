@@ -20,8 +20,8 @@ from paraflex.limits import DESIGNS, at_most
 from paraflex.results.metrics import METRICS
 from paraflex.results.numbers import plain
 from paraflex.results.tables import read_parquet, write_parquet
-from paraflex.studies.optimisation.schema import StudyTable
 from paraflex.writing import GO_ON, write_json
+from .schema import StudyTable
 
 TABLE = "indices.parquet"
 # Names of the indices in SALib, and columns of a row.

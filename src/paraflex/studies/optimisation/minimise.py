@@ -1,7 +1,5 @@
 """Optimisation methods of SciPy and Optuna, applied to one problem in the unit cube."""
 
-from __future__ import annotations
-
 import warnings
 from collections.abc import Callable, Mapping
 from typing import Any
@@ -10,7 +8,7 @@ import numpy as np
 
 from paraflex.arrays import Array
 from paraflex.errors import InputError, optional_package
-from paraflex.studies.optimisation.problem import DesignProblem
+from .problem import DesignProblem
 
 SLSQP, TRUST, LBFGSB, SIMPLEX = "slsqp", "trust-constr", "l-bfgs-b", "nelder-mead"
 EVOLUTION, OPTUNA = "differential-evolution", "optuna"

@@ -7,7 +7,7 @@ import numpy as np
 
 from paraflex.arrays import Array
 from paraflex.mechanism.quantities import known
-from paraflex.studies.optimisation.evaluate import EvaluatedDesign
+from .evaluate import EvaluatedDesign
 
 WORST, MEAN = "worst", "mean"
 

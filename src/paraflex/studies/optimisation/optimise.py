@@ -12,14 +12,14 @@ from paraflex.designs.schema import study_table
 from paraflex.designs.units import check_unit_of_metric
 from paraflex.errors import InputError
 from paraflex.results.metrics import Members
-from paraflex.studies.optimisation.evaluate import Evaluate, EvaluatedDesign, Session
-from paraflex.studies.optimisation.minimise import DEFAULT_SEARCH, minimise
-from paraflex.studies.optimisation.objective import Objective
-from paraflex.studies.optimisation.problem import DesignProblem, best_of, holds_limits
-from paraflex.studies.optimisation.result import SearchResult, of_session
-from paraflex.studies.optimisation.schema import ObjectiveTable, StudyTable
-from paraflex.studies.optimisation.session import SearchStudy, Solver, sampled_start
-from paraflex.studies.optimisation.study import base_study, read_search
+from .evaluate import Evaluate, EvaluatedDesign, Session
+from .minimise import DEFAULT_SEARCH, minimise
+from .objective import Objective
+from .problem import DesignProblem, best_of, holds_limits
+from .result import SearchResult, of_session
+from .schema import ObjectiveTable, StudyTable
+from .session import SearchStudy, Solver, sampled_start
+from .study import base_study, read_search
 
 # Default step of finite differences, as a fraction of a parameter's range.
 _DIFFERENCE_SHARE = 1e-3

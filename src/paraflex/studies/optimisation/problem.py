@@ -1,7 +1,5 @@
 """Optimisation problem as functions on the unit cube, defined everywhere, even for designs that do not run."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from functools import cached_property
 
@@ -10,10 +8,10 @@ import numpy as np
 from paraflex.arrays import Array
 from paraflex.campaign.study import Result
 from paraflex.errors import InputError
-from paraflex.studies.optimisation.evaluate import Evaluate, EvaluatedDesign
-from paraflex.studies.optimisation.objective import Objective
-from paraflex.studies.optimisation.slopes import Slopes, slopes_of
-from paraflex.studies.optimisation.study import DesignStudy
+from .evaluate import Evaluate, EvaluatedDesign
+from .objective import Objective
+from .slopes import Slopes, slopes_of
+from .study import DesignStudy
 
 # Relative violation of a limit that is tolerated.
 _LIMIT_EXCESS = 1e-6

@@ -6,12 +6,11 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, ClassVar
 
-from paraflex.campaign import KeptResult
-from paraflex.campaign.study import Result
+from paraflex.campaign import KeptResult, Result
 from paraflex.files.overlay import overlaid
-from paraflex.studies.optimisation.evaluate import EvaluatedDesign, Session
-from paraflex.studies.optimisation.study import DesignStudy
 from paraflex.writing import GO_ON, write_json, write_text
+from .evaluate import EvaluatedDesign, Session
+from .study import DesignStudy
 
 # Distance from a bound, as a fraction of the range, below which a parameter counts as being at it.
 _AT_BOUND = 1e-4

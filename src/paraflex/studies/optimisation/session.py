@@ -10,25 +10,17 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Generic, TypeVar
 
-from paraflex.campaign import OnProgress, Progress, Workers, kept_in, open_campaign
-from paraflex.campaign.study import Result
+from paraflex.campaign import OnProgress, Progress, Result, Workers, kept_in, open_campaign
 from paraflex.compilation import compile_kernels_for
 from paraflex.designs.reopen import study_account
 from paraflex.designs.run import RunTask, is_row_of, run_task, table_schema
 from paraflex.designs.samples import SOBOL, designs
 from paraflex.errors import InputError
-from paraflex.studies.optimisation.evaluate import Evaluate, EvaluatedDesign, LimitReached, Session
-from paraflex.studies.optimisation.minimise import DEFAULT_SEARCH, WITH_SLOPES
-from paraflex.studies.optimisation.result import SearchResult
-from paraflex.studies.optimisation.slopes import (
-    DIFFERENCES,
-    EXACT,
-    NO_SLOPES,
-    no_exact_slopes,
-    run_slopes,
-    slope_column,
-)
-from paraflex.studies.optimisation.study import DesignStudy
+from .evaluate import Evaluate, EvaluatedDesign, LimitReached, Session
+from .minimise import DEFAULT_SEARCH, WITH_SLOPES
+from .result import SearchResult
+from .slopes import DIFFERENCES, EXACT, NO_SLOPES, no_exact_slopes, run_slopes, slope_column
+from .study import DesignStudy
 
 if TYPE_CHECKING:
     import pyarrow as pa

@@ -6,13 +6,12 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from paraflex.arrays import Array
-from paraflex.campaign import Row
-from paraflex.campaign.study import Result
+from paraflex.campaign import Result, Row
 from paraflex.designs.run import Outcome, Task, error_row
 from paraflex.designs.setting import Setting
 from paraflex.errors import InputError, NumericalError
-from paraflex.studies.optimisation.evaluate import Evaluate, EvaluatedDesign
-from paraflex.studies.optimisation.study import DesignStudy
+from .evaluate import Evaluate, EvaluatedDesign
+from .study import DesignStudy
 
 EXACT, DIFFERENCES = "exact", "differences"
 # Column of the reason why a run has no exact derivatives.

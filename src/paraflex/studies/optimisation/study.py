@@ -20,13 +20,7 @@ from paraflex.files.overlay import Place, number_at
 from paraflex.limits import DESIGNS, at_most
 from paraflex.mechanism import quantities
 from paraflex.results.metrics import Members
-from paraflex.studies.optimisation.schema import (
-    GradientsName,
-    MethodName,
-    ParameterTable,
-    SearchTable,
-    StudyTable,
-)
+from .schema import GradientsName, MethodName, ParameterTable, SearchTable, StudyTable
 
 
 @dataclass(frozen=True)
