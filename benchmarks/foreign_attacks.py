@@ -25,7 +25,7 @@ import xarray as xr
 
 from paraflex.campaign.journal import JOURNAL, _digest as row_digest
 from paraflex.folders import MANIFEST, Manifest
-from paraflex.folders.manifest import digest_of
+from paraflex.folders.held import digest_of
 
 # Text that stands in the bait alone; the name of a tag and an attribute that nobody but the attacks uses; text that is
 # a formula, ends every element and quotation, and colours a terminal.

@@ -21,9 +21,8 @@ from paraflex.errors import InputError, OutputError
 from paraflex.figures.shapes import figure_of
 from paraflex.integrators import IntegrationOptions
 from paraflex.motion import simulate_motion
-from paraflex.plots import film_files, mechanism_drawing
-from paraflex.plots.film import FilmOptions, animate, plan_film
-from paraflex.plots.film_files import find_encoder
+from paraflex.plots import film, mechanism_drawing
+from paraflex.plots.film import FilmOptions, animate, find_encoder, plan_film
 from paraflex.plots.marks import block, ground_of, is_guide, moving_marks, zigzag
 from paraflex.plots.scene import ARROW, scale_bar, scene, select
 from paraflex.report.film import animation
@@ -223,7 +222,7 @@ def test_a_gif_moves_and_keeps_its_ground(data, tmp_path):
 @pytest.fixture
 def drawn(data, monkeypatch):
     """Pictures as they are asked for, two of them as the one before: copies, and how many there are at once."""
-    reduced, copies, alive, most = film_files._reduced, [], [], [0]
+    reduced, copies, alive, most = film._reduced, [], [], [0]
 
     def kept(film, report):
         for k, picture in enumerate(reduced(film, report)):
@@ -233,7 +232,7 @@ def drawn(data, monkeypatch):
             most[0] = max(most[0], sum(each() is not None for each in alive))
             yield picture
 
-    monkeypatch.setattr(film_files, "_reduced", kept)
+    monkeypatch.setattr(film, "_reduced", kept)
     return copies, most
 
 

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 import paraflex as pf
-import paraflex.dynamics.equilibrium as equilibria
+import paraflex.dynamics.quasi_static as equilibria
 from paraflex.cli.commands.models import InfoRequest
 from paraflex.cli.inspect import describe
 from paraflex.dynamics import (

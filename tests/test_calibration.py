@@ -9,7 +9,7 @@ import pytest
 from made_up import STUDY, made_up, write_study
 from paraflex.plots import targets_reached
 from paraflex.studies import identify, load_identification
-from paraflex.studies.optimisation.confidence import ONE_DEVIATION, student_factor
+from paraflex.studies.optimisation.identify import ONE_DEVIATION, student_factor
 from paraflex.studies.optimisation.slopes import NOISE_POINTS, noise_of
 
 FITS = 60

@@ -19,9 +19,8 @@ from paraflex.errors import ModelWarning
 from paraflex.files import library_names, library_text
 from paraflex.mechanism import ConstantSpeed, Deflection, PrescribedAngle
 from paraflex.plots.marks import SYMBOLS, moving_marks
-from paraflex.plots.model_acting import acting_arrows
 from paraflex.plots.model_drawing import model_drawing
-from paraflex.plots.model_sensors import sensor_marks
+from paraflex.plots.model_marks import acting_arrows, sensor_marks
 from paraflex.plots.scene import DrawnJoint, Limits, scene
 from paraflex.plots.signs import joint_sign
 from paraflex.plots.themes import THEMES

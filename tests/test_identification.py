@@ -10,8 +10,8 @@ from paraflex.designs.run import Task, run_task
 from paraflex.errors import InputError
 from paraflex.plots import targets_reached
 from paraflex.studies import identify, load_identification
-from paraflex.studies.optimisation.confidence import confidence
 from paraflex.studies.optimisation.fit import residual_slopes
+from paraflex.studies.optimisation.identify import confidence
 from shell import paraflex
 
 TARGET = """

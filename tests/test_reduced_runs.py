@@ -16,8 +16,7 @@ from paraflex.dynamics.points import marker_place
 from paraflex.dynamics.sparse import sparse_mass, stiffness_diagonal
 from paraflex.dynamics.state import State, nearest_state
 from paraflex.errors import InputError
-from paraflex.reduced_bodies.deflections import PlannedDeflections
-from paraflex.reduced_bodies.mechanism import bases_of
+from paraflex.reduced_bodies.mechanism import PlannedDeflections, bases_of
 from paraflex.results import load_results
 from paraflex.tracking import undeformed_at
 from shell import paraflex

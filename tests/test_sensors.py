@@ -30,7 +30,7 @@ from paraflex.errors import InputError
 from paraflex.files import model_from
 from paraflex.kernel.sampled import place_of
 from paraflex.mechanism import SENSOR_KINDS, Encoder, Sensor, StrainGauge
-from paraflex.mechanism.frames import in_frames
+from paraflex.mechanism.segments import in_frames
 from paraflex.mechanism.sensors import Location
 from paraflex.motion import simulate_motion
 from paraflex.report.motion import motion_page

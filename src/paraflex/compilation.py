@@ -32,9 +32,9 @@ from .tracking import plan_tracking
 # Script of each child process; its first action makes it end with the parent.
 _CHILD = """
 import sys
-from .interrupts import end_with_parent
+from paraflex.interrupts import end_with_parent
 end_with_parent(sys.stdin.fileno())
-from .compilation import compile_parts
+from paraflex.compilation import compile_parts
 compile_parts(sys.argv[1:])
 """
 

@@ -1,14 +1,10 @@
 """Base classes of studies and results, and for studies of many runs the workers, the journal and the tables."""
 
-from .folder import (
+from .journal import Journal as Journal, Row as Row
+from .study import (
     STUDY as STUDY,
     TRAJECTORIES as TRAJECTORIES,
     Campaign as Campaign,
-    open_campaign as open_campaign,
-    read_study as read_study,
-)
-from .journal import Journal as Journal, Row as Row
-from .study import (
     KeptResult as KeptResult,
     OnProgress as OnProgress,
     Progress as Progress,
@@ -18,6 +14,8 @@ from .study import (
     Workers as Workers,
     kept_in as kept_in,
     no_workers as no_workers,
+    open_campaign as open_campaign,
+    read_study as read_study,
 )
 from .tables import (
     checked_rows as checked_rows,

@@ -6,7 +6,7 @@ from typing import Any
 from paraflex.figures.controllers import controller_table
 from paraflex.figures.loads import stress_table
 from paraflex.figures.reduction import reduced_runs_table, reduced_words
-from paraflex.figures.run_tables import Runs, after_table, result_table
+from paraflex.figures.tracking import Runs, after_table, result_table
 from paraflex.findings import DONE_STATUSES
 from paraflex.results.findings import validity_line
 from paraflex.results.following import HEADLINE, ErrorSpan, below_tolerance_line

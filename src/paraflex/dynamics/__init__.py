@@ -8,7 +8,6 @@ from .coordinates import (
     node_marker as node_marker,
 )
 from .drive import DrivenFreedoms as DrivenFreedoms, driven_freedoms as driven_freedoms
-from .equilibrium import static_equilibrium as static_equilibrium
 from .inputs import Inputs as Inputs, inputs_of as inputs_of
 from .joint_coordinates import (
     JointCoordinate as JointCoordinate,
@@ -22,7 +21,12 @@ from .modal_truncation import MissingRotation as MissingRotation, missing_rotati
 from .numbers import numbers_of as numbers_of, same_layout as same_layout, with_numbers as with_numbers
 from .packing import records as records
 from .points import across_chord as across_chord
-from .quasi_static import JointMotion as JointMotion, balanced_state as balanced_state, joint_motions as joint_motions
+from .quasi_static import (
+    JointMotion as JointMotion,
+    balanced_state as balanced_state,
+    joint_motions as joint_motions,
+    static_equilibrium as static_equilibrium,
+)
 from .rank import Dependence as Dependence, dependence as dependence, redundant_rows as redundant_rows
 from .sensors import SensorRows as SensorRows, sensor_readings as sensor_readings, sensor_rows as sensor_rows
 from .signals import (

@@ -4,7 +4,17 @@ If the writer is killed, the next process that opens the folder completes the ch
 """
 
 from .changes import MANIFEST as MANIFEST, check_inside as check_inside
-from .held import ResultsFolder as ResultsFolder, added_to as added_to, hold_folder as hold_folder
+from .held import (
+    Manifest as Manifest,
+    ResultsFolder as ResultsFolder,
+    added_to as added_to,
+    check_listed as check_listed,
+    files_of as files_of,
+    foreign_files as foreign_files,
+    hold_folder as hold_folder,
+    kind_of_folder as kind_of_folder,
+    read_manifest as read_manifest,
+)
 from .kinds import (
     COMPARISON as COMPARISON,
     DATA_FILES as DATA_FILES,
@@ -23,12 +33,4 @@ from .lock import (
     FolderInUseError as FolderInUseError,
     finish_change as finish_change,
     lock_folder as lock_folder,
-)
-from .manifest import (
-    Manifest as Manifest,
-    check_listed as check_listed,
-    files_of as files_of,
-    foreign_files as foreign_files,
-    kind_of_folder as kind_of_folder,
-    read_manifest as read_manifest,
 )

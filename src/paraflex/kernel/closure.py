@@ -3,7 +3,7 @@
 from typing import Annotated, NamedTuple
 
 from . import joints
-from .arrays import Floats, Ints, allocated, copy, fill, largest
+from .arrays import Floats, Ints, allocated, copy, fill
 from .axes import apply_axes
 from .compiling import by_reference, inlined, releases_lock, routine, unoptimised
 from .constraints import constraint_values, fill_jacobian
@@ -172,12 +172,11 @@ def relative_change(work):
 
 @routine
 def close_loops(system, signals, marker, coordinates, t, goal, known, q, work):
-    """Close the loops at one time by Newton's method, from the pose in q; return the status and the remaining gap.
+    """Close the loops at one time by Newton's method, from the pose in q; return the status.
 
     `known` is True if work.factors are those of a pose nearby; they are used as long as the iteration converges
     quickly.
     """
-    gap = 0.0
     for iteration in range(MAX_ITERATIONS):
         constraint_values(system, signals, t, q, work.zero, work.body, work.phi, work.dphi)
         task_values(system, marker, coordinates, q, work.zero, work.zero, work.here)
@@ -185,20 +184,19 @@ def close_loops(system, signals, marker, coordinates, t, goal, known, q, work):
             work.single[r, 0] = work.phi[r]
         for i in range(coordinates.size):
             work.single[work.phi.size + i, 0] = work.here[0, i] - goal[i]
-        gap = largest(work.single[:, 0])
         if known and iteration < CHORDS:
             solve_scaled(system, coordinates, work.factors, work.order, work.single)
         else:
             scaled_jacobian(system, marker, coordinates, q, work.fresh)
             if factor_dense(work.fresh, work.fresh_order) < SINGULAR_PIVOT:
-                return LOOPS_SINGULAR, gap
+                return LOOPS_SINGULAR
             solve_scaled(system, coordinates, work.fresh, work.fresh_order, work.single)
         for j in range(q.size):
             q[j] -= work.single[j, 0]
         move = max(largest_shift(system, work.single[:, 0]), largest_turn(system, work.single[:, 0]))
         if move < SMALLEST_MOVE * (1.0 + max(largest_shift(system, q), largest_turn(system, q))):
-            return LOOPS_CLOSED, gap
-    return LOOPS_OPEN, gap
+            return LOOPS_CLOSED
+    return LOOPS_OPEN
 
 
 @inlined
@@ -257,9 +255,9 @@ def close_path(system, signals, marker_index, coordinates, times, target, q, v, 
 
     Returns
     -------
-    status, index, residual
-        Status; if it is not LOOPS_CLOSED, index of the last sample and its residual. Other values are LOOPS_OPEN,
-        LOOPS_SINGULAR, and TOO_COARSE if a singular position may lie between this sample and the previous one.
+    status, index
+        Status; if it is not LOOPS_CLOSED, index of the last sample. Other values are LOOPS_OPEN, LOOPS_SINGULAR, and
+        TOO_COARSE if a singular position may lie between this sample and the previous one.
     """
     marker = system.markers[marker_index]
     for k in range(times.size):
@@ -268,22 +266,22 @@ def close_path(system, signals, marker_index, coordinates, times, target, q, v, 
             for j in range(q.shape[1]):
                 q[k, j] = q[k - 1, j] + dt * (v[k - 1, j] + 0.5 * dt * a[k - 1, j])
         copy(q[k], work.unused)
-        status, gap = close_loops(system, signals, marker, coordinates, times[k], target[k, 0], k > 0, q[k], work)
+        status = close_loops(system, signals, marker, coordinates, times[k], target[k, 0], k > 0, q[k], work)
         if status != LOOPS_CLOSED:
-            return status, k, gap
+            return status, k
         for j in range(q.shape[1]):
             work.unused[j] -= q[k, j]
         if k > 0 and (
             largest_turn(system, work.unused) > LARGEST_TURN or largest_shift(system, work.unused) > LARGEST_SHIFT
         ):
-            return TOO_COARSE, k, gap
+            return TOO_COARSE, k
         scaled_jacobian(system, marker, coordinates, q[k], work.jacobian)
         if k > 0 and relative_change(work) >= 1.0:
-            return TOO_COARSE, k, gap
+            return TOO_COARSE, k
         for j in range(q.shape[1]):
             copy(work.jacobian[j], work.before[j])
             copy(work.jacobian[j], work.factors[j])
         if factor_dense(work.factors, work.order) < SINGULAR_PIVOT:
-            return LOOPS_SINGULAR, k, gap
+            return LOOPS_SINGULAR, k
         move_loops(system, signals, marker, coordinates, times[k], target[k], q[k], v[k], a[k], basis[k], work)
-    return LOOPS_CLOSED, times.size, 0.0
+    return LOOPS_CLOSED, times.size

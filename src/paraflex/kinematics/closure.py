@@ -354,7 +354,7 @@ class PathClosure:
         q[0] = pose
         scratch = make_closure_scratch(self.packed, self.coordinates.size, self.signals.start.size)
         given = (self.packed, self.signals, self.marker, self.coordinates, times, target)
-        status, index, _ = close_path(*given, q, v, a, basis, scratch)
+        status, index = close_path(*given, q, v, a, basis, scratch)
         return status, int(index), (q, v, a, basis)
 
     def approach(self, path: Path, pose: Array, start: float, end: float) -> Array:

@@ -21,7 +21,6 @@ from .damping import (
     RayleighDamping as RayleighDamping,
     stiffness_proportional as stiffness_proportional,
 )
-from .frames import in_frames as in_frames
 from .gears import Gear as Gear, Relation as Relation, SumRelation as SumRelation
 from .groups import Group as Group, grouped as grouped, groups_of as groups_of
 from .joints import (
@@ -83,6 +82,7 @@ from .segments import (
     SegmentedMechanism as SegmentedMechanism,
     check_segmentable as check_segmentable,
     finite_segments as finite_segments,
+    in_frames as in_frames,
     is_hinge as is_hinge,
     proportional_segments as proportional_segments,
 )

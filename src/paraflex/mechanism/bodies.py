@@ -159,8 +159,8 @@ class FlexibleBeam(DeformableBody):
     flexible : bool
         False holds all flexible coordinates at zero: a rigid beam of the same inertia.
     frames : int
-        Number of floating frames of equal length, welded together (`mechanism.frames`), by default 1. With more frames
-        large deflections converge to those of the exact beam. Results describe a single beam.
+        Number of floating frames of equal length, welded together (`mechanism.segments`), by default 1. With more
+        frames large deflections converge to those of the exact beam. Results describe a single beam.
     """
 
     name: str

@@ -17,8 +17,7 @@ from paraflex.results.posed import Posed
 from .drawing import Sketch
 from .layout import MM, TWO_COLUMNS, page_width
 from .marks import moving_marks, still_marks
-from .model_acting import Acting, acting_arrows, load_places
-from .model_sensors import SENSOR, SensorMark, sensor_marks
+from .model_marks import SENSOR, Acting, SensorMark, acting_arrows, load_places, sensor_marks
 from .named import Name, place_names
 from .scene import Limits, Scene, common_limits, limits_of, scene
 from .signs import arrow_sign, draw_arrow, joint_sign, sign_legend

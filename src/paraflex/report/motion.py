@@ -9,8 +9,8 @@ import xarray as xr
 from paraflex.arguments import checked_arguments
 from paraflex.figures.reduction import reduced_runs
 from paraflex.figures.run_motion import deflections_of
-from paraflex.figures.run_tables import Runs, most_bent, solver_table
 from paraflex.figures.selection import as_runs, names_of, samples
+from paraflex.figures.tracking import Runs, most_bent, solver_table
 from paraflex.findings import DONE_STATUSES
 from paraflex.formatting import number, peak, quantity, text_symbol, typeset
 from paraflex.results.findings import finished, validity_line, validity_summary

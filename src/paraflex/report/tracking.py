@@ -11,8 +11,8 @@ from paraflex.arguments import checked_arguments
 from paraflex.arrays import Mask
 from paraflex.figures.reduction import reduced_runs
 from paraflex.figures.run_motion import deflections_of, effort_axis
-from paraflex.figures.run_tables import Runs, after_table, result_table, solver_table
 from paraflex.figures.selection import default_mode, names_of, samples
+from paraflex.figures.tracking import Runs, after_table, result_table, solver_table
 from paraflex.findings import DONE_STATUSES
 from paraflex.formatting import number, peak, quantity
 from paraflex.results.findings import finished, validity_line, validity_summary
