@@ -209,7 +209,8 @@ def test_a_study_with_a_mode_that_cannot(task) -> None:
     result = run_study(task, ["++", "+-"])
     shown = read(result)
     assert result.data is not None
-    assert row(shown, "++")[2] == f"{1e3 * float(result.data['tracking_rms'][0]):.4g}"
+    assert row(shown, "++")[2] == f"{1e6 * float(result.data['tracking_rms'][0]):.4g}"
+    assert "error [µm]" in shown.text
     assert row(shown, "+-")[1] == "failed"
     assert "cannot drive the mechanism" in shown.text
     assert "no mode ran" in read(run_study(task, ["+-"])).text

@@ -6,6 +6,7 @@ from pathlib import Path
 from rich.progress import TaskProgressColumn, TimeRemainingColumn
 
 from paraflex.errors import InputError
+from paraflex.formatting import number
 from paraflex.results import open_results
 from . import COMPLETE, signals
 from .bars import late_bar
@@ -45,8 +46,8 @@ def animate_command(request: AnimateRequest) -> int:
     else:
         duration = float(film.time[-1] - film.time[0]) / film.speed
         console.print_lines(
-            f"{len(film.time)} pictures, {duration:.3g} s at {film.speed:g} of the speed, {width} x {height} pixels in "
-            f"{output}"
+            f"{len(film.time)} pictures, {number(duration, 3)} s at {film.speed:g} of the speed, {width} x {height} "
+            f"pixels in {output}"
         )
     return COMPLETE
 

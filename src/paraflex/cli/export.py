@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+from paraflex.formatting import number
 from paraflex.results import open_results
 from paraflex.results.export import export, export_table
 from .commands.requests import flagged
@@ -25,4 +26,4 @@ def export_command(request: ExportRequest) -> None:
             files = export(data, output, request.to, shapes=request.shapes, force=request.force)
     console = PlainConsole(stderr=True)
     for file in files:
-        console.print_lines(f"{file} ({file.stat().st_size / 1e6:.3g} MB)")
+        console.print_lines(f"{file} ({number(file.stat().st_size, 3, factor=1e-6)} MB)")

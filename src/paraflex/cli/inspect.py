@@ -1,16 +1,36 @@
-"""`paraflex info`: facts on a mechanism and whether it is sound; without a name, the contents of the library."""
+"""`paraflex info`: facts on a mechanism, its frequencies, and whether it is sound; without a name, the library."""
 
 import json
 import math
 from contextlib import suppress
 from typing import Any
 
-from paraflex.checks import check, examine
-from paraflex.dynamics import Closure, DrivenFreedoms, Mobility, System, build_system, closure_of, mobility
-from paraflex.errors import ProportionError
+import numpy as np
+
+from paraflex.arrays import Array
+from paraflex.checks import BALANCED, check, examine
+from paraflex.dynamics import (
+    Closure,
+    DrivenFreedoms,
+    Mobility,
+    State,
+    System,
+    Vibration,
+    assembled_position,
+    build_system,
+    closure_of,
+    mobility,
+    natural_frequencies,
+    static_equilibrium,
+    undeformed,
+)
+from paraflex.dynamics.linearise import LOWEST
+from paraflex.dynamics.signals import moment_signals
+from paraflex.errors import AssemblyError, InputError, ProportionError
 from paraflex.files import Model, library_names, load
 from paraflex.findings import Finding, Level
-from paraflex.formatting import speed_text
+from paraflex.formatting import number, speed_text
+from paraflex.kinematics import follow_path
 from paraflex.mechanism import (
     Actuator,
     AppliedTorque,
@@ -25,11 +45,74 @@ from paraflex.mechanism import (
     grouped,
     loops,
 )
+from paraflex.motion import UNBALANCED
 from .collected import printed
 from .commands.models import InfoRequest
-from .frequencies import frequencies, hertz
 from .inspect_tables import print_facts, print_library
-from .request import requested_model
+from .request import check_time, requested_model
+
+
+def frequencies(
+    model: Model, system: System, rigid: System, start: State, assembly: str, request: InfoRequest
+) -> dict[str, Any]:
+    """Return natural frequencies with motors held and free, and time, acceleration and equilibrium of their pose."""
+    motors = list(dict.fromkeys(motor.joint for motor in model.mechanism.motors))
+    state = start if request.at is None else _pose_at(model, rigid, start, assembly, request.at, request.path)
+    state = undeformed(system, rigid, state)
+    if request.balanced:
+        try:
+            state = static_equilibrium(system, state, motors)
+        except AssemblyError as error:
+            raise InputError(error.cause, field="--balanced", remedy=UNBALANCED) from error
+    held = natural_frequencies(system, state, motors, count=LOWEST) if motors else None
+    free = natural_frequencies(system, state, torque_at=motors, count=LOWEST)
+    is_equilibrium = free.acceleration < BALANCED
+    return {
+        "time": state.time,
+        "balanced": request.balanced,
+        "acceleration": free.acceleration,
+        "is_equilibrium": is_equilibrium,
+        "equilibrium_nearby": is_equilibrium or _has_equilibrium(system, state, motors),
+        "motors_held_hz": None if held is None else hertz(held.frequencies),
+        "motors_free_hz": hertz(free.frequencies),
+        "growing": max(_growing(free), 0 if held is None else _growing(held)),
+    }
+
+
+def _has_equilibrium(system: System, state: State, held: list[str]) -> bool:
+    """Return whether `--balanced` would find an equilibrium from a pose."""
+    try:
+        static_equilibrium(system, state, held)
+    except AssemblyError:
+        return False
+    return True
+
+
+def _pose_at(model: Model, rigid: System, start: State, assembly: str, at: float, path: str | None) -> State:
+    """Return the pose of the rigid mechanism at the time `at` [s], on its path or by its prescribed angles."""
+    check_time(at)
+    if path is not None or model.paths:
+        motion = follow_path(model.mechanism, model.path(path), [0.0, at] if at else [0.0], assembly=assembly)
+        return State(at, motion.q[-1], np.zeros(rigid.n))
+    if rigid.n != rigid.n_constraints:
+        raise InputError(
+            "the model has no path, and its prescribed angles do not give its pose at later times",
+            field="--at",
+            value=at,
+            remedy="leave it out",
+        )
+    q = assembled_position(rigid, moment_signals(rigid.mechanism, at), at, start.q)
+    return State(at, q, np.zeros(rigid.n))
+
+
+def _growing(vibration: Vibration) -> int:
+    return int(np.sum(vibration.squares < 0.0))
+
+
+def hertz(omega: Array) -> list[float]:
+    """Convert angular frequencies [rad/s] to frequencies [Hz]."""
+    return [float(w) / (2.0 * np.pi) for w in omega]
+
 
 # Largest number of loops and of redundant constraints listed.
 _LISTED = 1000
@@ -148,7 +231,7 @@ def _actuator(mechanism: Mechanism, actuator: Actuator) -> str:
 
 def _load(load: PointForce | AppliedTorque) -> str:
     """Return name, kind, components and place of a load; a component that depends on time reads "in time"."""
-    parts = ["in time" if isinstance(one, TimeProfile) else f"{one:.4g}" for one in load.components]
+    parts = ["in time" if isinstance(one, TimeProfile) else number(one) for one in load.components]
     size = f"({', '.join(parts)})" if len(parts) > 1 else parts[0]
     return f"{load.name}: {load.kind} {size} {load.unit} at {load.point}"
 
@@ -166,9 +249,9 @@ def _equation(one: Relation) -> str:
     sign = "-" if one.phase and one.phase < 0.0 else "+"
     if isinstance(one, SumRelation):
         terms = " ".join(f"{weight:+.4g} {joint}" for joint, weight in one.weights.items())
-        return f"{one.name}: {terms} = {one.phase:.4g}"
-    phase = f" {sign} {abs(one.phase):.4g}" if one.phase else ""
-    return f"{one.name}: {one.second_joint} = {one.transmission:.4g} {one.first_joint}{phase}"
+        return f"{one.name}: {terms} = {number(one.phase)}"
+    phase = f" {sign} {number(abs(one.phase))}" if one.phase else ""
+    return f"{one.name}: {one.second_joint} = {number(one.transmission)} {one.first_joint}{phase}"
 
 
 def _links(mechanism: Mechanism, system: System) -> list[dict[str, Any]]:

@@ -9,6 +9,7 @@ from rich.table import Table
 from paraflex.errors import listed
 from paraflex.files import generator_names
 from paraflex.findings import Level
+from paraflex.formatting import number
 from paraflex.mechanism import Mechanism, groups_of
 from .tables import PlainConsole, framed_table
 
@@ -123,8 +124,8 @@ def _print_starts(console: PlainConsole, facts: dict[str, Any]) -> None:
     headings = ("assembly", "gap of the given angles", "closed to [m, rad]", "rates to [1/s]", "remaining gap", "where")
     table = framed_table("assemblies, rigid", headings, right=(1, 2, 3, 4))
     for start in facts["starts"]:
-        numbers = ["" if start[key] is None else f"{start[key]:.2g}" for key in ("gap_before", "position", "velocity")]
-        gap = "none" if start["closes"] else (f"{start['gap']:.3g}" if start["gap"] else "")
+        numbers = [number(start[key], 2, missing="") for key in ("gap_before", "position", "velocity")]
+        gap = "none" if start["closes"] else (number(start["gap"], 3) if start["gap"] else "")
         table.add_row(start["assembly"], *numbers, gap, listed(start["where"], _LISTED))
     if facts["starts"]:
         console.print(table)
@@ -163,7 +164,7 @@ def _print_frequencies(console: PlainConsole, facts: dict[str, Any]) -> None:
     console.print(f"natural frequencies of the assembled mechanism at rest, t = {found['time']:g} s, {pose} [Hz]")
     for label, key in (("motors held", "motors_held_hz"), (free, "motors_free_hz")):
         if found[key] is not None:
-            lowest = ", ".join(f"{f:.4g}" for f in found[key][:6])
+            lowest = ", ".join(map(number, found[key][:6]))
             console.print_lines(f"  {label}: {lowest or 'none: nothing can move'}")
     if found["growing"]:
         where = (
@@ -179,6 +180,6 @@ def _print_frequencies(console: PlainConsole, facts: dict[str, Any]) -> None:
             else "there is none nearby"
         )
         console.print_lines(
-            f"  not an equilibrium: when released it would start with {found['acceleration']:.3g} m/s^2, root mean "
-            f"square over the mass; {nearby}"
+            f"  not an equilibrium: when released it would start with {number(found['acceleration'], 3)} m/s^2, root "
+            f"mean square over the mass; {nearby}"
         )

@@ -7,6 +7,7 @@ from typing import Any
 
 from rich.table import Table
 
+from paraflex.formatting import number
 from paraflex.integrators import DEFAULT_METHOD, METHODS, Method
 from .commands.models import MethodsRequest
 from .tables import PlainConsole, plain_table
@@ -21,7 +22,7 @@ def methods_command(request: MethodsRequest) -> None:
     heads = ("name", "title", "form", "order", "steps", "constraints")
     out.print(_table("methods of integration", heads, ("title", "form"), map(_row, METHODS.values())))
     parameters = (
-        [method.name, name, f"{one.default:g}", f"{one.low:.4g} to {one.high:.4g}", one.meaning]
+        [method.name, name, number(one.default, 6), f"{number(one.low)} to {number(one.high)}", one.meaning]
         for method in METHODS.values()
         for name, one in method.parameters.items()
     )

@@ -121,7 +121,7 @@ def buckling_chart(data: xr.Dataset) -> Iterator[Chart]:
     for choice, (_, factor, (before, swung)) in enumerate(buckled(data)):
         curves += [*_outlines(data, before, PLAIN_LOOK._replace(dash=DOTTED), "before", choice),
                    *_outlines(data, swung, None, "", choice)]  # fmt: skip
-        choices.append(f"load factor {factor:.4g}")
+        choices.append(f"load factor {number(factor)}")
     if not choices:
         return
     yield Chart(

@@ -6,10 +6,10 @@ from matplotlib.figure import Figure
 from .drawing import mechanism_drawing as mechanism_drawing
 from .equilibria import buckling_shapes as buckling_shapes, deformed_shapes as deformed_shapes
 from .maps import response_map as response_map
+from .mechanism import desired_path as desired_path
 from .mode_shapes import mode_shapes as mode_shapes
 from .parallel import parallel_coordinates as parallel_coordinates
 from .save import save_figures as save_figures
-from .workspace import desired_path as desired_path
 
 def actuation_condition(data: Any, *args: Any, **options: Any) -> Figure: ...
 def bases_along_path(data: Any, *args: Any, **options: Any) -> Figure: ...

@@ -23,6 +23,7 @@ from PIL import GifImagePlugin, Image, ImageChops
 
 from paraflex.arguments import checked_arguments
 from paraflex.errors import InputError, OutputError
+from paraflex.formatting import number
 from paraflex.interrupts import starting_processes
 from paraflex.writing import whole_file, whole_folder
 from .drawing import caption
@@ -85,7 +86,7 @@ def _animated_svg(film: Film) -> str:
     keys = np.unique(np.linspace(0, time.size - 1, count).round()).astype(int)
     with journal_style(), rc_context({"svg.fonttype": "none", "font.family": ["DejaVu Sans", "sans-serif"]}):
         figure, sketches, texts = stage(film)
-        texts[-1].set_text(f"t = {time[0]:.4g} to {clock(time[-1], time[-1])[4:]}")
+        texts[-1].set_text(f"t = {number(time[0])} to {clock(time[-1], time[-1])[4:]}")
         still = _still_svg(figure, [artist for sketch in sketches for artist in sketch.artists])
     moving = []
     for shown, sketch in zip(film.scenes, sketches, strict=True):

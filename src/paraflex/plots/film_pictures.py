@@ -10,6 +10,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from paraflex.arrays import Array, NDArray
+from paraflex.formatting import number
 from .drawing import Sketch, bare, caption, draw_load_keys, draw_scale_bar, name_links
 from .labels import plain
 from .scene import Scene, common_limits
@@ -78,7 +79,7 @@ def frames(film: Film, numbers: Iterable[int] | None = None) -> Iterator[NDArray
             for sketch, text in zip(sketches, texts[:-1], strict=True):
                 sketch.show(i)
                 over = time > sketch.scene.reached + 1e-12
-                text.set_text(f"ended at {sketch.scene.reached:.4g} s" if over else "")
+                text.set_text(f"ended at {number(sketch.scene.reached)} s" if over else "")
                 for artist in sketch.artists:
                     sketch.axes.draw_artist(artist)
                 figure.draw_artist(text)

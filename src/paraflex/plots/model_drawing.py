@@ -309,7 +309,7 @@ def _entries(
         entries.append(("end-effector", Line2D([], [], linestyle="none", **tip)))
     if posed.payload is not None and posed.mechanism.payload is not None:
         carried = Line2D([], [], **_PAYLOAD | {"markersize": 6.5}, **_payload_colours(look))
-        entries.append((f"payload {posed.mechanism.payload.mass:.4g} kg", carried))
+        entries.append((f"payload {number_text(posed.mechanism.payload.mass)} kg", carried))
     if posed.path:
         entries.append(("path", Line2D([], [], color=look.desired, linewidth=1.0, linestyle=(0, (3, 2)))))
         entries.append(("its start", Line2D([], [], **_START, markeredgecolor=look.desired)))

@@ -11,6 +11,7 @@ from paraflex.dynamics import System, closure_of, moment_signals, reference_pose
 from paraflex.dynamics.projection import joint_gaps, row_unit
 from paraflex.dynamics.rank import joint_of_row
 from paraflex.errors import InputError, NumericalError
+from paraflex.formatting import number
 from paraflex.kinematics import Path, follow_path
 from paraflex.mechanism import Mechanism, PointRef, Start
 from .acting import first_movements, first_movements_along
@@ -129,7 +130,9 @@ def _assembled(mechanism: Mechanism, assembly: str | None, path: tuple[str, Path
         # The unit of a joint's gap is that of its row with the largest residual.
         rows = [rigid.rows[k] for k in np.argsort(np.abs(phi))]
         units = {joint_of_row(row): row_unit(row) for row in rows}
-        gaps = {name: f"{gap:.3g} {units[name]}" for name, gap in joint_gaps(rigid, phi).items() if gap > _CLOSED}
+        gaps = {
+            name: f"{number(gap, 3)} {units[name]}" for name, gap in joint_gaps(rigid, phi).items() if gap > _CLOSED
+        }
         return replace(_of(mechanism, rigid, chosen.name, q[None], path, (found.problem,)), gaps=gaps)
     if path is None:
         return _of(mechanism, rigid, chosen.name, found.state.q[None])

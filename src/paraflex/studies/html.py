@@ -1,17 +1,17 @@
 """HTML representation of the results of studies in notebooks."""
 
 from paraflex.designs.sweep import SweepResult
-from paraflex.display import described, facts, page, sentence, table
+from paraflex.display import described, facts, page, sentence
 from paraflex.figures import search, sensitivity
 from paraflex.figures.laws import law_table
 from paraflex.figures.methods import tables
 from paraflex.figures.search import IDENTIFICATION
+from paraflex.figures.tracking import Runs, after_table, result_table
 from paraflex.figures.verification import model_table, path_extent
 from paraflex.formatting import number, quantity
 from paraflex.late import view
 from paraflex.results import summary
 from paraflex.results.findings import finding_lines, validity_line, verdict_of
-from paraflex.results.following import HEADLINE, SPAN_WORDS, ErrorSpan
 from .agreement import Verification
 from .comparison import MethodComparison
 from .law_comparison import LawComparison
@@ -28,30 +28,14 @@ def study_html(result: StudyResult) -> str:
         reasons = [sentence(f"{mode}: {reason}") for mode, reason in result.failed.items()]
         return page("study: no mode ran", *reasons)
     found = summary(result.data, result.failed)
-    motors = [str(name) for name in result.data["motor"].values]
-    unit = result.data["torque"].attrs.get("units", "N m")
-    span = ErrorSpan(found["error"])
-    rows, why = [], []
-    for name, mode in found["modes"].items():
-        if "message" in mode:
-            why.append(sentence(f"{name}: {mode['message']}"))
-        if "steps" not in mode:
-            rows.append((name, mode["status"], *[""] * (len(motors) + 7)))
-            continue
-        rows.append((
-            name, mode["status"], _millimetres(mode[HEADLINE[span]]), _millimetres(mode["tracking_rms_after"]),
-            _millimetres(mode["drift_speed"]), _millimetres(mode["residual_vibration"]),
-            *(mode["peak_torque"][motor] for motor in motors),
-            mode["steps"], mode["newton_iterations"], mode["wall_time"],
-        ))  # fmt: skip
-    peaks = [f"peak {motor} [{unit}]" for motor in motors]
-    heads = ("mode", "status", f"RMS tracking error {SPAN_WORDS[span]} [mm]", "after the motion [mm]", "drift [mm/s]",
-             "residual vibration [mm]", *peaks, "steps", "Newton iterations", "wall time [s]")  # fmt: skip
-    title = f"{found['mechanism']}, {len(rows)} mode{'' if len(rows) == 1 else 's'}"
+    why = [sentence(f"{name}: {mode['message']}") for name, mode in found["modes"].items() if "message" in mode]
+    rows = Runs({"": result.data}, {"": list(result.failed)})
+    title = f"{found['mechanism']}, {len(rows.rows)} mode{'' if len(rows.rows) == 1 else 's'}"
     title += ", interrupted" if result.interrupted else ""
     holds = validity_line({name: mode.get("validity") for name, mode in found["modes"].items()})
     why += [sentence(holds)] if holds else []
-    return page(title, *map(sentence, finding_lines(verdict_of(result.data))), table(heads, rows), *why)
+    tables = (result_table(rows, brief=True), after_table(rows))
+    return page(title, *map(sentence, finding_lines(verdict_of(result.data))), *map(described, tables), *why)
 
 
 @view.register(SweepResult)
@@ -148,7 +132,3 @@ def _rate(fresh: int, what: str, seconds: float) -> str | None:
 
 def _state(finished: bool, interrupted: bool) -> str:
     return "interrupted" if interrupted else "finished" if finished else "not finished"
-
-
-def _millimetres(metres: float | None) -> float | None:
-    return None if metres is None else 1e3 * metres
