@@ -88,10 +88,12 @@ def rows_of(series: dict[str, Any]) -> list[np.ndarray]:
 
 
 def array_of(packed: dict[str, Any]) -> np.ndarray:
-    """An array as the page reads it: sums of 16-bit differences that wrap round."""
+    """An array as the page reads it: sums of 16-bit differences that wrap round, with their sign in the lowest bit."""
     raw = zlib.decompress(base64.b64decode(packed["data"]))
-    steps = np.frombuffer(raw, dtype=np.uint8).reshape(2, -1).T.copy().view("<i2").reshape(packed["shape"])
-    whole = np.cumsum(steps, axis=1, dtype=np.int16)
+    folded = np.frombuffer(raw, dtype=np.uint8).reshape(2, -1).T.copy().view("<u2").reshape(packed["shape"])
+    whole = (folded >> 1).astype(np.int16) ^ -(folded & 1).astype(np.int16)
+    for _ in range(packed["order"]):
+        whole = np.cumsum(whole, axis=1, dtype=np.int16)
     values = packed["scale"] * whole + np.array(packed["offset"])
     return np.where(whole == MISSING, np.nan, values)
 

@@ -113,6 +113,9 @@ def test_arrays_come_back_within_half_a_step_with_their_gaps():
     rng = np.random.default_rng(4)
     values = np.cumsum(rng.normal(size=(2, 60, 5, 2)), axis=1) + [3.0, -40.0]
     values[1, 30:] = np.nan
+    smooth = np.sin(np.linspace(0.0, 3.0, 60))[:, None, None] * values[:, :1]
+    assert [packed(one)["order"] for one in (values, smooth)] == [1, 2]
+    np.testing.assert_allclose(array_of(packed(smooth)), smooth, rtol=0, atol=0.51 * np.ptp(smooth) / 65534)
     back = array_of(packed(values))
     assert np.array_equal(np.isnan(back), np.isnan(values))
     span = np.ptp(values[np.isfinite(values).all(axis=-1)], axis=0).max()

@@ -51,6 +51,8 @@ def packed(values: ArrayLike) -> dict[str, Any]:
     """Return an array (runs, frames, ...) with last axis x, y for JSON: 16 bits per number, differences over frames.
 
     A number is `offset + scale * integer`, with separate offsets for x and y; it is NaN where the integer is MISSING.
+    Differences are of the first order, or of the second, which are smaller for smooth motions. Their sign is the lowest
+    bit, so that the higher bytes of small ones are zero.
     """
     array = np.asarray(values, dtype=float)
     flat = array.reshape(-1, array.shape[-1])
@@ -62,9 +64,17 @@ def packed(values: ArrayLike) -> dict[str, Any]:
     known = np.isfinite(array).all(axis=-1)
     whole[known] = np.rint((array[known] - offset) / scale)
     # Integer overflow of the differences cancels in the sums.
-    whole[:, 1:] = np.diff(whole, axis=1)
-    data = _deflated(np.ascontiguousarray(whole).view(np.uint8).reshape(-1, 2))
-    return {"shape": list(array.shape), "offset": offset.tolist(), "scale": scale, "data": data}
+    first = np.diff(whole, axis=1, prepend=np.int16(0))
+    second = np.diff(first, axis=1, prepend=np.int16(0))
+    order = 1 + bool(_bits(second) < _bits(first))
+    signed = (first, second)[order - 1]
+    data = _deflated(((signed << 1) ^ (signed >> 15)).astype("<i2").view(np.uint8).reshape(-1, 2))
+    return {"shape": list(array.shape), "offset": offset.tolist(), "scale": scale, "order": order, "data": data}
+
+
+def _bits(whole: NDArray[np.int16]) -> float:
+    """Return the number of bits of integers, as far as they depend on their magnitudes."""
+    return float(np.log2(1.0 + np.abs(whole.astype(np.float32))).sum())
 
 
 def _deflated(numbers: NDArray[np.uint8]) -> str:

@@ -35,22 +35,22 @@ const report = (() => {
     delete page.series.data;
   }
 
-  // An array (runs, frames, ...) with x, y last, in metres; NaN where there is nothing.
+  // An array (runs, frames, ...) with x, y last, in metres; NaN where there is nothing. It is stored as differences over
+  // frames, of first or second order, with the sign in the lowest bit.
   async function unpacked(array) {
     const { buffer } = gathered(await inflated(array.data), 2);
     const whole = new Int16Array(buffer);
     const [runs, frames] = array.shape;
     const wide = whole.length / (runs * frames) || 0;
     const values = new Float32Array(whole.length);
-    for (let run = 0; run < runs; run++) {
-      for (let frame = 0; frame < frames; frame++) {
-        const start = (run * frames + frame) * wide;
-        for (let k = 0; k < wide; k++) {
-          if (frame > 0) whole[start + k] += whole[start + k - wide];
-          const number = whole[start + k];
-          values[start + k] = number === -32768 ? NaN : array.offset[k % 2] + array.scale * number;
-        }
+    for (let k = 0; k < whole.length; k++) whole[k] = ((whole[k] & 0xffff) >>> 1) ^ -(whole[k] & 1);
+    for (let order = 0; order < array.order; order++) {
+      for (let run = 0; run < runs; run++) {
+        for (let k = (run * frames + 1) * wide; k < (run + 1) * frames * wide; k++) whole[k] += whole[k - wide];
       }
+    }
+    for (let k = 0; k < whole.length; k++) {
+      values[k] = whole[k] === -32768 ? NaN : array.offset[k % 2] + array.scale * whole[k];
     }
     return { values, runs, frames, wide };
   }
