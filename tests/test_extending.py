@@ -121,7 +121,7 @@ import paraflex as pf
 from paraflex.files import load_data, model_from
 
 data = load_data("five_bar")[0]
-for torque in ({"left": 0.1, "right": 0.2}, -1.0, {"lift": 0.1}, "0.1 N", {"left": 0.0}):
+for torque in ({"left": 0.1, "right": 0.2}, -1.0, {"lift": 0.1}, "0.1 N", {"left": 0.0}, {"left": np.nan}):
     data["controller"] = {"relay": {"type": "relay", "torque": torque, "period": 1e-3}}
     try:
         model = model_from(data, "own.toml")
@@ -130,6 +130,19 @@ for torque in ({"left": 0.1, "right": 0.2}, -1.0, {"lift": 0.1}, "0.1 N", {"left
         print(run.controllers[0].law, run.controllers[0].outputs, len(run.controllers[0].t))
     except pf.InputError as error:
         print(error)
+
+
+@dataclass(frozen=True)
+class NoLaw(Law, kind="none", title="none"):
+    def start(self, plant):
+        return None
+
+
+law = pf.SampledController(NoLaw(), period=1e-3, outputs=["left"])
+try:
+    pf.Simulation(pf.load("five_bar"), mode="left", duration=0.01, samples=11, start="outward").run(law, warning=False)
+except pf.ParaflexError as error:
+    print(error)
 """
 
 
@@ -142,6 +155,10 @@ def test_a_law_with_a_state_of_its_own_is_read_and_checked_by_what_its_fields_sa
         "own.toml: controller.relay.torque: a quantity in N where one in N m is asked for (got '0.1 N'); give the "
         "torque in N m, of all motors or by motor",
         "own.toml: controller.relay.torque.left: must be positive (got 0.0); give it in N m",
+        "own.toml: controller.relay.torque.left: should be a finite number (got nan); give the torque in N m, of all "
+        "motors or by motor",
+        'controller "controller" raised TypeError: its `start` returned NoneType, not a LinearLaw or another '
+        "StartedLaw at t = 0 s (step 0); correct the controller",
     ]
 
 

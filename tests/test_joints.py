@@ -10,6 +10,7 @@ from conftest import make_linkage
 from paraflex.dynamics import build_system
 from paraflex.kernel.joints import body_joints, body_motors, start_rows
 from paraflex.kernel.packed import make_scratch
+from paraflex.mechanism import Joint
 
 SEEDS = (31, 32)
 TIME = 0.37
@@ -186,3 +187,15 @@ def test_markers_stand_where_their_points_are(linkage):
             N, slope = twins.beam_shape(body.mesh.nodes, x), twins.beam_slope(body.mesh.nodes, x)
             np.testing.assert_allclose(marker.N, N @ body.integrals.D, rtol=0, atol=1e-13 * scale)
             np.testing.assert_allclose(marker.slope, slope @ body.integrals.D, rtol=0, atol=1e-12 * scale)
+
+
+def test_a_kind_of_joint_has_a_name_of_its_own_and_holds_what_kernels_know():
+    with pytest.raises(TypeError, match="there is a joint of kind"):
+
+        class Other(Joint, kind="revolute", holds=("points",)):
+            pass
+
+    with pytest.raises(TypeError, match="holds 'point'"):
+
+        class Misspelt(Joint, kind="misspelt", holds=("point",)):
+            pass

@@ -1,11 +1,17 @@
 """Kinds of results: one record has all that folders, figures, exports and reports ask of a kind."""
 
+import numpy as np
 import pytest
+import xarray as xr
 
 import paraflex.report
+from paraflex.errors import InputError
+from paraflex.figures.charts import Curve
 from paraflex.folders import DATA_FILES, FOLDER_FILES, RESULT_KINDS
 from paraflex.plots.catalogue import CATALOGUE
 from paraflex.plots.sources import kind_of_numbers
+from paraflex.results.export import result_tables
+from paraflex.results.kinds import kind_of
 
 
 def test_every_kind_with_data_has_figures_and_a_report_or_says_why_not():
@@ -43,3 +49,23 @@ def test_folders_are_told_apart_by_their_files():
 )
 def test_plain_numbers_are_recognised_by_their_entries(found, kind):
     assert kind_of_numbers(found) == kind
+
+
+def test_a_misspelt_kind_is_not_taken_for_runs():
+    data = xr.Dataset({"torque": ("time", np.zeros(3))}, attrs={"kind": "motoin"})
+    with pytest.raises(InputError, match=r"kind: unknown kind of results \(got 'motoin'\); did you mean \"motion\"\?"):
+        kind_of(data)
+    assert kind_of(data.assign_attrs(kind="motion")) == "motion"
+
+
+def test_tables_need_the_dimension_along_which_results_go():
+    data = xr.Dataset({"torque": ("tiem", np.zeros(3))}, attrs={"kind": "motion"})
+    with pytest.raises(InputError, match='no dimension "time"'):
+        result_tables(data)
+    # Without figures on the whole there is no table of them.
+    assert list(result_tables(data.rename(tiem="time"))) == ["time_series"]
+
+
+def test_a_curve_has_as_many_abscissae_as_ordinates():
+    with pytest.raises(ValueError, match='curve "one" has'):
+        Curve("one", np.zeros(3), np.zeros(4))

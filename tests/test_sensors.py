@@ -685,10 +685,30 @@ def test_the_location_of_a_sensor_exists(own, location, says):
         pendulum_with(two_points(lambda place: place[:, 0], location))
 
 
+@pytest.mark.parametrize(
+    ("read", "says"),
+    [
+        (lambda apart: np.sqrt(np.sum(apart**2, axis=1)), "sensor.own: its reading has no derivative here"),
+        (lambda apart: apart[:, 0] / apart[:, 1], "sensor.own: its reading is no number here"),
+    ],
+)
+def test_a_reading_without_a_derivative_is_refused_with_its_name(own, read, says):
+    """A distance where it is zero, and a number divided by zero."""
+    sensor = two_points(lambda place: read(place - place.real))
+    system = build_system(pendulum_with(sensor))
+    with np.errstate(all="ignore"), pytest.raises(InputError, match=says):
+        sensor_rows(system, *any_state(system), [sensor])
+
+
 def test_kinds_of_sensors_have_a_name_of_their_own_and_a_unit(own):
     with pytest.raises(TypeError, match="there is a sensor of kind"):
 
         class Other(Sensor, kind="encoder", units=("rad",)):
+            pass
+
+    with pytest.raises(TypeError, match=r'units=\("m/s",\)'):
+
+        class Text(Sensor, kind="text", units="m/s"):  # pyright: ignore[reportArgumentType]
             pass
 
     with pytest.raises(TypeError, match="has no unit"):

@@ -211,6 +211,7 @@ def _counts(model: Model, system: System, rigid: System) -> dict[str, Any]:
         "paths": list(model.paths),
         **{group.plural_noun: list(map(_equation, members)) for group, members in grouped(mechanism) if group.relates},
         "sensors": [sensor.name for sensor in mechanism.sensors],
+        "controllers": list(model.controllers),
     }
 
 

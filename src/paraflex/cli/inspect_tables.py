@@ -91,11 +91,12 @@ def _counts(facts: dict[str, Any]) -> Table:
         ("total mass [kg]", "total_mass"),
         ("assemblies", "assemblies"),
         *((words, words) for words in related),
+        ("controllers", "controllers"),
         ("modes", "modes"),
         ("paths", "paths"),
     ):
         # Empty rows of gears and the like are left out, as most mechanisms have none.
-        if key in facts and (facts[key] or key not in (*related, "actuators", "prescribed", "loads")):
+        if key in facts and (facts[key] or key not in (*related, "actuators", "prescribed", "loads", "controllers")):
             value = facts[key]
             if key == "total_mass" and facts["payload"]:
                 table.add_row(label, f"{value:g}, including its payload")

@@ -4,6 +4,7 @@ Every sensor reads from the few bodies, constraint rows and motors that it depen
 its derivatives. Squire, Trapp (1998), Using complex variables to estimate derivatives of real functions.
 """
 
+import math
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import cache, partial
@@ -24,6 +25,8 @@ from .sections import section_at
 from .system import System
 
 _STEP = 1e-30
+# Share of the parts of a derivative in a direction by which it may differ from their sum.
+_SMOOTH = 1e-9
 
 
 class MotionSamples(NamedTuple):
@@ -162,6 +165,15 @@ class _Local:
             remedy = "return readings (k,), and use no abs, norm or real part: np.sqrt(np.sum(x**2, axis=1))"
             raise InputError(problem, field=field, remedy=remedy)
         return readings
+
+    def check_slopes(self, slopes: Array, direction: Array, together: float) -> None:
+        """Check that the derivatives by all inputs (c,) give the derivative in a direction, as of a smooth reading."""
+        field, remedy = f"sensor.{self._sensor.name}", "linearise where it has one, as a distance that is not zero"
+        parts = slopes * direction
+        if not (np.isfinite(slopes).all() and math.isfinite(together)):
+            raise InputError("its reading is no number here", field=field, remedy=remedy)
+        if abs(parts.sum() - together) > _SMOOTH * np.abs(parts).sum():
+            raise InputError("its reading has no derivative here", field=field, remedy=remedy)
 
 
 class _LocalInputs:
@@ -302,6 +314,8 @@ def sensor_rows(
     multipliers: Array,
     torques: Array,
     sensors: Sequence[Sensor] | None = None,
+    *,
+    checked: bool = True,
 ) -> SensorRows:
     """Return the derivatives of the readings at one state by all their inputs, exact up to rounding.
 
@@ -315,11 +329,13 @@ def sensor_rows(
         Multipliers.
     torques : (motors,) array
         Torque or force of every motor.
+    checked : bool
+        Whether a reading that has no derivatives at the state is refused.
 
     Raises
     ------
     InputError
-        A sensor refers to a member that the mechanism does not have.
+        A sensor refers to a member that the mechanism does not have, or its reading has no derivatives.
     """
     state = MotionSamples(*(np.asarray(each)[None] for each in (q, v, a, multipliers, torques)))
     found = _locals(system, sensors)
@@ -327,9 +343,13 @@ def sensor_rows(
     for each in found:
         own = each.taken(state)
         sizes = [values.shape[1] for values in own]
-        steps = np.split(1j * _STEP * np.eye(sum(sizes)), np.cumsum(sizes)[:-1], axis=1)
+        # The last step is in all directions together.
+        directions = np.vstack([np.eye(sum(sizes)), np.cos(np.arange(sum(sizes)))])
+        steps = np.split(1j * _STEP * directions, np.cumsum(sizes)[:-1], axis=1)
         moved = MotionSamples(*(values + step for values, step in zip(own, steps, strict=True)))
-        slopes = np.imag(each.read(moved)) / _STEP
+        *slopes, together = np.imag(each.read(moved)) / _STEP
+        if checked:
+            each.check_slopes(np.array(slopes), directions[-1], together)
         for kind, columns, values in zip(entries, each.columns, np.split(slopes, np.cumsum(sizes)[:-1]), strict=True):
             kind.append((columns, values))
     return SensorRows(*(_sparse(kind, values.shape[1]) for kind, values in zip(entries, state, strict=True)))

@@ -158,6 +158,10 @@ class Curve:
     line: bool = False
     texts: Sequence[str] = ()
 
+    def __post_init__(self) -> None:
+        if self.x is not None and np.shape(self.x) != np.shape(self.y):
+            raise ValueError(f'curve "{self.name}" has {np.shape(self.x)} abscissae and {np.shape(self.y)} ordinates')
+
     def is_shown(self, run: int | None, choice: int | None) -> bool:
         """Check whether the curve is shown for a selected run and a choice; None for all of them."""
         return (self.shown is None or run is None or run in self.shown) and (

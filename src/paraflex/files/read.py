@@ -209,7 +209,10 @@ def validate(schema: type[T], data: dict[str, Any], source: str) -> T:
 def _first_problem(schema: type[BaseModel], data: dict[str, Any], error: ValidationError, source: str) -> InputError:
     if (problem := _other_kind(schema, data, source)) is not None:
         return problem
-    problem = min(error.errors(), key=lambda d: (_rank(schema, data, d), len(d["loc"])))
+    # A table where a number may stand too has its problem within it.
+    problem = min(error.errors(), key=lambda d: (
+        isinstance(d.get("input"), dict) and d["type"].startswith("float"), _rank(schema, data, d), len(d["loc"]),
+    ))  # fmt: skip
     location = _fields(schema, data, problem)
     field = ".".join(str(part) for part in location)
     place = field_at(schema, data, location)

@@ -300,10 +300,18 @@ def _member_table(kinds: Mapping[str, Any], base: type[_Table] = _Table) -> Any:
 
 
 def _table_of_any(kinds: Iterable[type], **entries: Any) -> type[_Table]:
-    """Return a table with some entries and with the fields of several classes, all of them optional."""
+    """Return a table with some entries and with the fields of several classes, all of them optional.
+
+    A field that classes declare in several ways has all their types and descriptions.
+    """
+    found: dict[str, Any] = {}
     for kind in kinds:
-        entries |= _fields_of(kind, needed=False, without=("name", *entries))
-    return create_model("AnyTable", __base__=_Table, **entries)
+        for name, (hint, field) in _fields_of(kind, needed=False, without=("name", *entries)).items():
+            known, shown = found.get(name, (hint, field))
+            if field.description not in shown.description:
+                shown = Field(None, description=f"{shown.description}; or {field.description}")
+            found[name] = known if known == hint else known | hint, shown
+    return create_model("AnyTable", __base__=_Table, **entries, **found)
 
 
 class SectionTable(

@@ -119,7 +119,8 @@ class Joint(CheckedFields, _Directions):
         Whether the axis is the deformed centre line of the beam of point a; otherwise the axis turns with the material
         at a.
     symbol : str
-        Symbol in drawings, a name of `plots.marks.SYMBOLS`; by default that of the joint with the same constraints.
+        Symbol in drawings, a name of `plots.marks.SYMBOLS`; by default that of the joint with the same constraints, or
+        the name of the kind; without such a symbol only its place is drawn.
     slides, moves : bool
         Whether the joint coordinate is a travel along the axis [m] and not the angle of b relative to a [rad]; whether
         this coordinate is free.
@@ -141,6 +142,10 @@ class Joint(CheckedFields, _Directions):
         cls, *, kind: str, holds: tuple[str, ...], symbol: str = "", follows_beam: bool = False
     ) -> None:
         super().__init_subclass__()
+        if unknown := set(holds) - {"points", "axis", "angle", "distance"}:
+            raise TypeError(f'{cls.__name__} holds {min(unknown)!r}: give "points", "axis", "angle" or "distance"')
+        if kind in JOINT_KINDS and JOINT_KINDS[kind].__qualname__ != cls.__qualname__:
+            raise TypeError(f'there is a joint of kind "{kind}": {JOINT_KINDS[kind].__name__}')
         cls.kind, cls.holds, cls.follows_beam = kind, holds, follows_beam
         cls.slides = "axis" in holds
         cls.moves = cls.slides or not {"angle", "distance"}.intersection(holds)

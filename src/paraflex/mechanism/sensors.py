@@ -178,6 +178,8 @@ class Sensor(CheckedFields, ABC):
     def __init_subclass__(cls, *, kind: str = "", units: tuple[str, ...] = (), rigid: bool | None = None) -> None:
         super().__init_subclass__()
         cls.rigid = cls.rigid if rigid is None else rigid
+        if isinstance(units, str):
+            raise TypeError(f'{cls.__name__} has units={units!r}, a text: write units=("{units}",)')
         if kind:
             if kind in SENSOR_KINDS and SENSOR_KINDS[kind].__qualname__ != cls.__qualname__:
                 raise TypeError(f'there is a sensor of kind "{kind}": {SENSOR_KINDS[kind].__name__}')

@@ -129,7 +129,7 @@ SENSOR: dict[str, Any] = {"marker": "D", "markersize": 3.6, "markeredgewidth": 1
 # Length of the arrow of an axis and radius of that of an angle, as shares of the picture's larger side; start angle and
 # sweep of the latter [rad], and relative size of the heads.
 _AXIS, _RADIUS = 0.055, 0.02
-_FROM, _BY, _HEAD = -0.7, 1.6, 0.45
+_FROM, _BY, _SENSOR_HEAD = -0.7, 1.6, 0.45
 
 
 @dataclass(frozen=True)
@@ -151,9 +151,9 @@ def sensor_marks(posed: Posed, limits: Limits) -> list[SensorMark]:
 def _mark(posed: Posed, sensor: Sensor, limits: Limits) -> SensorMark:
     place, axis = _place_and_axis(posed, sensor.location)
     if axis is None:
-        line, head = round_arrow(place[None], _RADIUS * limits.size, _FROM, np.array([_BY]), limits, _HEAD)
+        line, head = round_arrow(place[None], _RADIUS * limits.size, _FROM, np.array([_BY]), limits, _SENSOR_HEAD)
     else:
-        line, head = straight_arrow(place[None], (place + _AXIS * limits.size * axis)[None], limits, _HEAD)
+        line, head = straight_arrow(place[None], (place + _AXIS * limits.size * axis)[None], limits, _SENSOR_HEAD)
     arrow = Arrow(line[0], head[0], round=axis is None)
     return SensorMark(sensor.kind.replace("_", " "), sensor.name, place, arrow)
 

@@ -5,7 +5,7 @@ from collections.abc import Iterable
 import xarray as xr
 
 from paraflex.arguments import checked_arguments, named_in_errors
-from paraflex.errors import InputError
+from paraflex.errors import InputError, suggestion
 from paraflex.folders import RESULT_KINDS
 
 # Names of the figures on the course of a run, which every record has.
@@ -36,8 +36,11 @@ def kind_of(data: xr.Dataset) -> str:
     """Return "verification", "motion" (without a path), "linear", "reduction", "statics", "laws" or "tracking"."""
     if "model" in data.dims:
         return "verification"
-    kind = str(data.attrs.get("kind"))
-    return kind if kind in RESULT_KINDS and RESULT_KINDS[kind].producers else "tracking"
+    kind = str(data.attrs.get("kind", "tracking"))
+    known = [name for name, one in RESULT_KINDS.items() if one.producers]
+    if kind not in known:
+        raise InputError("unknown kind of results", field="kind", value=kind, remedy=suggestion(kind, known))
+    return kind
 
 
 def check_kind(data: xr.Dataset, *kinds: str) -> None:

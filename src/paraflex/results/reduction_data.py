@@ -23,7 +23,7 @@ _COUNTS = (2, 3, 5, 9, 17, 33)
 # Largest difference of the coordinates of equal poses, in their units.
 _SAME = 1e-6
 # Number of frequencies of responses, lowest one relative to the highest, and number of compared natural frequencies.
-_FREQUENCIES, _LOWEST, _COMPARED = 60, 1e-2, 2
+_ALONG_FREQUENCIES, _ALONG_LOWEST, _ALONG_COMPARED = 60, 1e-2, 2
 UNITS_ALONG = {
     "along_error": ("largest error of the responses up to the highest frequency, over the full model's gain", "1"),
     "along_frequency_error": ("largest relative error of the two lowest natural frequencies above zero", "1"),
@@ -130,7 +130,7 @@ class _Measured:
 
     def __init__(self, model: LinearModel, until: float) -> None:
         self.s: NDArray[np.complexfloating[Any, Any]] = (
-            2.0 * np.pi * np.geomspace(_LOWEST * until, until, _FREQUENCIES) * (1j + DAMPING)
+            2.0 * np.pi * np.geomspace(_ALONG_LOWEST * until, until, _ALONG_FREQUENCIES) * (1j + DAMPING)
         )
         self.response: Complex = model.frequency_response(self.s)
         self.motors: list[str] = motors_of(model)
@@ -165,7 +165,7 @@ def output_errors(full: Complex, few: Complex) -> Array:
 def _relative(few: Array, full: Array) -> float:
     """Return the largest relative error of the lowest frequencies above zero, NaN if the reduced model has too few."""
     free = int(np.sum(full == 0.0))
-    chosen = slice(free, free + _COMPARED)
+    chosen = slice(free, free + _ALONG_COMPARED)
     if few[chosen].size < full[chosen].size or not full[chosen].size:
         return np.nan
     return float(np.max(np.abs(few[chosen] / full[chosen] - 1.0)))

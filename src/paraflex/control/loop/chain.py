@@ -294,6 +294,8 @@ class _OwnSteps(StartedLaw):
 def _started(law: Any, plant: Plant) -> StartedLaw:
     """Return the law in a run: what its `start` returns, or the law itself with its own steps."""
     started = law.start(plant) if hasattr(law, "start") else None
+    if isinstance(law, Law) and not isinstance(started, StartedLaw):
+        raise TypeError(f"its `start` returned {type(started).__name__}, not a LinearLaw or another StartedLaw")
     return started if isinstance(started, StartedLaw) and "step" not in vars(law) else _OwnSteps(law)
 
 

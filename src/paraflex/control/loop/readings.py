@@ -146,8 +146,8 @@ def _affine(system: System, sensor: Sensor) -> Affine | None:
     angle, still = system.body(system.bodies[0].name if frame == GROUND else frame).angle, np.zeros(n)
     turning = np.zeros(n)
     turning[angle] = 1.0
-    at_rest = sensor_rows(system, still, still, still, np.zeros(m), np.zeros(motors), [sensor])
-    turned = sensor_rows(system, still, turning, still, np.zeros(m), np.zeros(motors), [sensor])
+    at_rest = sensor_rows(system, still, still, still, np.zeros(m), np.zeros(motors), [sensor], checked=False)
+    turned = sensor_rows(system, still, turning, still, np.zeros(m), np.zeros(motors), [sensor], checked=False)
     reader = SensorReader(system, [sensor])
 
     def read(q: Array, v: Array, a: Array, multipliers: Array, torques: Array) -> Array:

@@ -125,7 +125,7 @@ class JointPID(Law, kind="pid", title="PID of joints"):
 
         Its states are those of the rates, and the sums of motors with an integral gain.
         """
-        Kp, Kd, Ki = (_gains_of(getattr(self, name), motors, name) for name in ("stiffness", "damping", "integral"))
+        Kp, Kd, Ki = (gains_of(getattr(self, name), motors, name) for name in ("stiffness", "damping", "integral"))
         rates = BackwardDifference(period, self.cutoff).linear_law(len(motors))
         summed, gain = np.eye(len(motors))[Ki > 0.0], np.diag(Ki * period)
         # Fraction of the excess torque by which the sums are brought back in a period.
@@ -149,7 +149,7 @@ def check_pairs(inputs: Sequence[str], outputs: Sequence[str]) -> None:
         )  # fmt: skip
 
 
-def _gains_of(gains: Any, motors: Sequence[str], field: str) -> Array:
+def gains_of(gains: Any, motors: Sequence[str], field: str) -> Array:
     """Return one gain for each motor (motors,), from one for all, one for each, or values by motor.
 
     Raises
