@@ -58,12 +58,11 @@ def test_a_misspelt_kind_is_not_taken_for_runs():
     assert kind_of(data.assign_attrs(kind="motion")) == "motion"
 
 
-def test_tables_need_the_dimension_along_which_results_go():
-    data = xr.Dataset({"torque": ("tiem", np.zeros(3))}, attrs={"kind": "motion"})
-    with pytest.raises(InputError, match='no dimension "time"'):
-        result_tables(data)
-    # Without figures on the whole there is no table of them.
-    assert list(result_tables(data.rename(tiem="time"))) == ["time_series"]
+@pytest.mark.parametrize(("dim", "name", "shape"), [("time", "time_series", (3, 2)), ("tiem", "figures", (1, 3))])
+def test_no_table_is_empty(dim, name, shape):
+    """Variables along another dimension than that of their kind are figures, one for each of its places."""
+    data = xr.Dataset({"torque": (dim, np.zeros(3))}, attrs={"kind": "motion"})
+    assert {table: found.shape for table, found in result_tables(data).items()} == {name: shape}
 
 
 def test_a_curve_has_as_many_abscissae_as_ordinates():

@@ -72,17 +72,12 @@ def result_tables(data: xr.Dataset, *, shapes: bool = False) -> dict[str, pd.Dat
     drawn = [name for name in data.data_vars if "station" in data[name].dims]
     forces = [name for name in data.data_vars if SECTION in data[name].dims]
     dim, first = kind.along
-    if dim not in data.dims:
-        raise InputError(
-            f'no dimension "{dim}", along which results of kind "{kind.name}" go', field="data", value=list(data.sizes),
-            remedy="give what the function that makes them returned",
-        )  # fmt: skip
     rows = (*_ROW_DIMENSIONS, dim)
     along = [name for name in data.data_vars if dim in data[name].dims and name not in (*drawn, *forces)]
     controlled = {name: controller_variables(name) for name in controller_names(data)}
     others = {*drawn, *forces, *along, *(name for names in controlled.values() for name in names)}
     single = [name for name in data.data_vars if name not in others]
-    tables = {first: _table(data, along, rows)}
+    tables = {first: _table(data, along, rows)} if along or not single else {}
     if single:
         tables[FIGURES_TABLE] = _table(data, single, _ROW_DIMENSIONS)
     for name, own in controlled.items():
