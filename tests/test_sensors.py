@@ -686,17 +686,17 @@ def test_the_location_of_a_sensor_exists(own, location, says):
 
 
 @pytest.mark.parametrize(
-    ("read", "says"),
+    ("read", "message"),
     [
         (lambda apart: np.sqrt(np.sum(apart**2, axis=1)), "sensor.own: its reading has no derivative here"),
         (lambda apart: apart[:, 0] / apart[:, 1], "sensor.own: its reading is no number here"),
     ],
 )
-def test_a_reading_without_a_derivative_is_refused_with_its_name(own, read, says):
+def test_a_reading_without_a_derivative_is_refused_with_its_name(own, read, message):
     """A distance where it is zero, and a number divided by zero."""
     sensor = two_points(lambda place: read(place - place.real))
     system = build_system(pendulum_with(sensor))
-    with np.errstate(all="ignore"), pytest.raises(InputError, match=says):
+    with np.errstate(all="ignore"), pytest.raises(InputError, match=message):
         sensor_rows(system, *any_state(system), [sensor])
 
 

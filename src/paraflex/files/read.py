@@ -209,10 +209,7 @@ def validate(schema: type[T], data: dict[str, Any], source: str) -> T:
 def _first_problem(schema: type[BaseModel], data: dict[str, Any], error: ValidationError, source: str) -> InputError:
     if (problem := _other_kind(schema, data, source)) is not None:
         return problem
-    # A table where a number may stand too has its problem within it.
-    problem = min(error.errors(), key=lambda d: (
-        isinstance(d.get("input"), dict) and d["type"].startswith("float"), _rank(schema, data, d), len(d["loc"]),
-    ))  # fmt: skip
+    problem = min(error.errors(), key=lambda d: (_rank(schema, data, d), len(d["loc"])))
     location = _fields(schema, data, problem)
     field = ".".join(str(part) for part in location)
     place = field_at(schema, data, location)
@@ -327,6 +324,9 @@ def _rank(schema: type[BaseModel], data: dict[str, Any], problem: Any) -> int:
         return 0 if get_close_matches(name, list(known), n=1) else 1
     # A wrong type, such as a list for a table, is reported by all variants of a union except the intended one.
     if problem["type"] in (*_NO_TABLE, "list_type") and len(location) < len(problem["loc"]):
+        return 2
+    # So is a table where a number may stand too; its problem is within it.
+    if problem["type"] == "float_type" and isinstance(problem["input"], dict):
         return 2
     return 2 if problem["type"] == "missing" and name not in known else 1
 

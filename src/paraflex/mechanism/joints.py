@@ -13,7 +13,7 @@ from typing import Any, ClassVar
 from paraflex.arguments import CheckedFields, checked_arguments, named_in_errors
 from paraflex.errors import InputError, within
 from .profiles import TimeProfile, check_motion
-from .quantities import AT_JOINT, JointThat, field_metadata, finite, optional, positive
+from .quantities import AT_JOINT, JointThat, enter_kind, field_metadata, finite, optional, positive
 
 GROUND = "ground"
 
@@ -144,13 +144,11 @@ class Joint(CheckedFields, _Directions):
         super().__init_subclass__()
         if unknown := set(holds) - {"points", "axis", "angle", "distance"}:
             raise TypeError(f'{cls.__name__} holds {min(unknown)!r}: give "points", "axis", "angle" or "distance"')
-        if kind in JOINT_KINDS and JOINT_KINDS[kind].__qualname__ != cls.__qualname__:
-            raise TypeError(f'there is a joint of kind "{kind}": {JOINT_KINDS[kind].__name__}')
+        enter_kind(JOINT_KINDS, kind, cls, "joint")
         cls.kind, cls.holds, cls.follows_beam = kind, holds, follows_beam
         cls.slides = "axis" in holds
         cls.moves = cls.slides or not {"angle", "distance"}.intersection(holds)
         cls.symbol = symbol or _SYMBOLS.get(holds, kind)
-        JOINT_KINDS[kind] = cls
 
     def check_moves(self, field: str, does: JointThat = "moves") -> None:
         """Check that the joint has the motion that `does` requires: a free angle, a free travel, either, or none.

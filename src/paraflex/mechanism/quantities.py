@@ -32,6 +32,13 @@ def all_listed(given: Iterable[str], names: Collection[str], field: str, problem
             raise InputError(problem, field=field, value=name, remedy=f"choose from {', '.join(names)}")
 
 
+def enter_kind(kinds: dict[str, Any], kind: str, member: type, word: str) -> None:
+    """Enter a class under its name in files; raise a `TypeError` if another class has the name."""
+    if kind in kinds and kinds[kind].__qualname__ != member.__qualname__:
+        raise TypeError(f'there is a {word} of kind "{kind}": {kinds[kind].__name__}')
+    kinds[kind] = member
+
+
 def finite(values: float | Iterable[float], field: str) -> None:
     """Raise an `InputError` unless a value, or each of several, is finite and of admissible size."""
     several = isinstance(values, Iterable) and getattr(values, "ndim", 1)

@@ -15,7 +15,7 @@ from paraflex.errors import InputError
 from paraflex.limits import of_size
 from .bodies import AssumedModesBeam, Body, FlexibleBeam
 from .joints import GROUND, Joint, PointRef
-from .quantities import AT_JOINT, field_metadata, finite, known, optional
+from .quantities import AT_JOINT, enter_kind, field_metadata, finite, known, optional
 
 # Kinds of sensors by their names in files.
 SENSOR_KINDS: "dict[str, type[Sensor]]" = {}
@@ -181,12 +181,10 @@ class Sensor(CheckedFields, ABC):
         if isinstance(units, str):
             raise TypeError(f'{cls.__name__} has units={units!r}, a text: write units=("{units}",)')
         if kind:
-            if kind in SENSOR_KINDS and SENSOR_KINDS[kind].__qualname__ != cls.__qualname__:
-                raise TypeError(f'there is a sensor of kind "{kind}": {SENSOR_KINDS[kind].__name__}')
             if not units and cls.unit is Sensor.unit:
                 raise TypeError(f"{cls.__name__} has no unit: give the class units=, or a method `unit`")
+            enter_kind(SENSOR_KINDS, kind, cls, "sensor")
             cls.kind, cls.units = kind, units
-            SENSOR_KINDS[kind] = cls
 
     @abstractmethod
     def read(self, moving: SensorInputs) -> Numbers:

@@ -61,10 +61,10 @@ def find_figure(source: Source, name: str) -> CatalogueFigure:
     for figure in there:
         if name in (figure.name, figure.written_as):
             return figure
+    if not there:
+        raise InputError("nothing in these results can be drawn", field="FIGURE", value=name, remedy="see their report")
     names = [figure.name for figure in there]
     near = suggestion(name, names)
-    if not names:
-        raise InputError("nothing in these results can be drawn", field="FIGURE", value=name, remedy="see their report")
     listed = "" if near.startswith("choose from") else f" There are: {', '.join(names)}"
     elsewhere = "" if name not in figure_names() else f", of results of kind {source.kind}"
     raise InputError(f"no such figure{elsewhere}", field="FIGURE", value=name, remedy=near + listed)

@@ -37,8 +37,8 @@ def kind_of(data: xr.Dataset) -> str:
     if "model" in data.dims:
         return "verification"
     kind = str(data.attrs.get("kind", "tracking"))
-    known = [name for name, one in RESULT_KINDS.items() if one.producers]
-    if kind not in known:
+    if kind not in RESULT_KINDS or not RESULT_KINDS[kind].producers:
+        known = [name for name, one in RESULT_KINDS.items() if one.producers]
         raise InputError("unknown kind of results", field="kind", value=kind, remedy=suggestion(kind, known))
     return kind
 

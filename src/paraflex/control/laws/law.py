@@ -14,7 +14,7 @@ from paraflex.arrays import Array
 from paraflex.errors import InputError
 from paraflex.mechanism import Mechanism
 from paraflex.mechanism.measured import encoders_of, measured_sensors
-from paraflex.mechanism.quantities import all_known, field_metadata
+from paraflex.mechanism.quantities import all_known, enter_kind, field_metadata
 from .controllers import Plant
 
 # Kinds of control laws by their names in files; `kinds` imports the modules that define those of paraflex.
@@ -122,10 +122,8 @@ class Law(CheckedFields, ABC):
             raise TypeError(f"{cls.__name__} has a method `step`: give it to the object that `start` returns")
         cls.title = title or cls.title
         if kind:
-            if kind in LAWS and LAWS[kind].__qualname__ != cls.__qualname__:
-                raise TypeError(f'there is a law of kind "{kind}": {LAWS[kind].__name__}')
+            enter_kind(LAWS, kind, cls, "law")
             cls.kind = kind
-            LAWS[kind] = cls
 
     def __post_init__(self) -> None:
         super().__post_init__()
