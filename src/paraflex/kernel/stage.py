@@ -56,7 +56,7 @@ def equations(system, signals, t, weights, q, v, a, lam, torques, work):
     residuals(system, signals, t, weights, q, v, a, lam, torques, work)
 
 
-@inlined
+@routine
 def solve_linear(system, signals, t, weights, q, v, a, lam, torques, work):
     """Solve for accelerations and multipliers at (t, q, v), in which the equations are linear, with their factor."""
     # The second pass only removes rounding.
