@@ -30,11 +30,11 @@ imports: $(VENV)/.dev
 
 # One thread for small matrices, as commands have it: of several processes with several threads each waits for the others.
 tests: $(VENV)/.dev $(VENV)/.kernels
-	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest --numprocesses auto --dist loadfile
+	OPENBLAS_NUM_THREADS=1 $(BIN)/python -m pytest --numprocesses auto --dist loadfile --no-loadscope-reorder
 
 # Which lines no test reaches; a third slower, so not a part of the test.
 coverage: $(VENV)/.dev $(VENV)/.kernels
-	$(BIN)/python -m pytest --numprocesses auto --dist loadfile --cov --cov-report=term
+	$(BIN)/python -m pytest --numprocesses auto --dist loadfile --no-loadscope-reorder --cov --cov-report=term
 
 docs: $(VENV)/.dev
 	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --site-dir site

@@ -67,7 +67,16 @@ def run_tests(setting: str, tests: list[str], folder: Path, workers: str) -> Non
     }
     environment |= {"OPENBLAS_NUM_THREADS": "1", "MARGINS": str(records), **SETTINGS[setting]}
     environment["PYTHONPATH"] = os.pathsep.join(filter(None, (str(TESTS), os.environ.get("PYTHONPATH"))))
-    options = ["-p", "margins", f"--junitxml={results}", "--numprocesses", workers, "--dist", "loadfile"]
+    options = [
+        "-p",
+        "margins",
+        f"--junitxml={results}",
+        "--numprocesses",
+        workers,
+        "--dist",
+        "loadfile",
+        "--no-loadscope-reorder",
+    ]
     for command in (["paraflex.compilation"], ["pytest", *options, *tests]):
         subprocess.run([sys.executable, "-m", *command], cwd=TESTS.parent, env=environment, check=False)
 

@@ -39,10 +39,22 @@ if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
 if signal.getsignal(signal.SIGHUP) is signal.SIG_IGN:
     signal.signal(signal.SIGHUP, signal.SIG_DFL)
+# The files that take longest, begun first: at the end no worker is left with one of them while the other is idle.
+LONGEST = (
+    "test_docs", "test_notebooks", "test_interrupts", "test_examples", "test_extending", "test_plot_command",
+    "test_sweep_engines", "test_tangent", "test_loads_in_time", "test_report_browser", "test_gears", "test_statics",
+    "test_compilation", "test_replacing", "test_verification", "test_kills", "test_fuzzing",
+)  # fmt: skip
 SQUARE = ((0.050, 0.314), (-0.050, 0.314), (-0.050, 0.214), (0.050, 0.214))
 DESKTOP, PHONE = {"width": 1440, "height": 900}, {"width": 390, "height": 844}
 # Soft enough that bending, stretching and inertia are of one magnitude in a random state.
 RUBBER = Material(youngs_modulus=5e6, density=1100.0)
+
+
+def pytest_collection_modifyitems(items):
+    """Begin with the files that take longest, see `LONGEST`; the others keep their order."""
+    place = {name: k for k, name in enumerate(LONGEST)}
+    items.sort(key=lambda item: place.get(item.path.stem, len(LONGEST)))
 
 
 @pytest.fixture(scope="session")

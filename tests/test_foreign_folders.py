@@ -334,8 +334,8 @@ def test_units_of_tables_are_not_copied_with_every_column(tmp_path):
     assert (tmp_path / "table.csv").read_text().startswith('"c0 [m]","c1 [m]"')
 
 
-def test_what_a_terminal_cannot_show_ends_no_command():
+def test_what_a_terminal_cannot_show_ends_no_command(tmp_path):
     command = (sys.executable, "-m", "paraflex", "run", "pendulum", "--duration", "0.05", "--samples", "6")
-    done = run(*command, env={"PYTHONIOENCODING": "ascii"})
+    done = run(*command, env={"PYTHONIOENCODING": "ascii"}, cwd=tmp_path)
     assert done.returncode == 0, done.stderr
     assert "?" in done.stdout
