@@ -236,12 +236,7 @@ def transverse_pieces(body: BodyCoordinates) -> Array:
     """
     mesh = body.mesh
     assert mesh is not None
-    # Six values determine a quintic.
-    z, pieces = np.linspace(0.0, 1.0, 6), []
-    for e, length in enumerate(np.diff(mesh.nodes)):
-        powers = np.linalg.solve(np.vander(z, increasing=True), mesh.transverse_rows(e, z * length))
-        pieces.append(powers / (length ** np.arange(6))[:, None] @ body.integrals.D)
-    return np.array(pieces)
+    return mesh.transverse_powers() @ body.integrals.D
 
 
 def element_at(nodes: Array, place: Array) -> Indices:

@@ -17,14 +17,14 @@ Cook, Malkus, Plesha, Witt (2002), Concepts and Applications of Finite Element A
 between nodes superposed on the results of nodal displacements).
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
 from paraflex.arrays import Array
-from paraflex.fem.integrals import GAUSS_PLACES, GAUSS_WEIGHTS
+from paraflex.fem import BeamMesh
 from paraflex.mechanism import AssumedModesBeam, FlexibleBeam, Material, Section
 from paraflex.mechanism.bodies import per_span
 from .contacts import Contacts, contacts_of
@@ -37,9 +37,6 @@ from .system import System
 _BEAM_PIECES, _ELEMENT_PIECES = 16, 4
 # Coordinates with less than this fraction of the stretch under uniform tension do not give the axial force.
 _STRETCHES = 0.95
-Shape = Callable[[int, Array, int], Array]
-# An element and positions in it, as fractions of its length.
-_Places = tuple[int, Array]
 
 
 class SectionLoads(NamedTuple):
@@ -122,7 +119,7 @@ class Sections:
 
 
 class _Beam(NamedTuple):
-    """Moment and axial force of a beam per flexible coordinate (s, nf), and the corrections of its shape functions.
+    """Loads of a beam at its stations, linear in the features of its motion: see `_features`.
 
     Attributes
     ----------
@@ -130,10 +127,10 @@ class _Beam(NamedTuple):
         Distance from the beam's first end [m].
     bars : sequence of Section and Material
         Section and material at each of these places.
-    resisted : (s, nf) array, optional
-        Moment per acceleration of each coordinate across the beam.
-    change : _Change, optional
-        Change of the axial force within elements.
+    moment : (s, features) array
+        Bending moment per feature.
+    force : (s, features) array, optional
+        Axial force per feature; None if the coordinates do not stretch.
     contacts : Contacts, optional
         Joints that slide along the beam.
     """
@@ -143,23 +140,7 @@ class _Beam(NamedTuple):
     bars: Sequence[tuple[Section, Material]]
     moment: Array
     force: Array | None
-    resisted: Array | None = None
-    change: "_Change | None" = None
     contacts: Contacts | None = None
-
-
-class _Change(NamedTuple):
-    """Mass per length (s,) [kg/m], and c less its mean per unit of it.
-
-    c is given for accelerations with the shapes along and across the beam (s, nf), equal to x (s,), and equal to one
-    (s,).
-    """
-
-    mass: Array
-    along: Array
-    across: Array
-    place: Array
-    one: Array
 
 
 def sections_of(system: System) -> Sections | None:
@@ -202,15 +183,13 @@ class SectionAt(NamedTuple):
 
         The multipliers are those of joints sliding along the beam only, one for each of `sliding_joints`.
         """
-        body, part = system.body(self.part.body), self.part
-        u, added = q[:, body.flexible], 0.0
+        body, part, added = system.body(self.part.body), self.part, 0.0
         if part.contacts is not None:
             load = part.contacts.load(system, q, multipliers)
-            u, added = u - load.deflected, part.contacts.moments(np.broadcast_to(self.place, (len(q), 1)), load)
-        moment = u @ part.moment.T + added
-        if part.resisted is not None:
-            moment = moment + _across(body, q, v, a) @ part.resisted.T
-        return moment[:, 0], _axial(system, part, q, v, a)[:, 0]
+            added = part.contacts.moments(np.broadcast_to(self.place, (len(q), 1)), load)
+            added = added - load.deflected @ part.moment[:, : body.nf].T
+        moment, force = _linear_loads(part, _features(system, body, q, v, a))
+        return (moment + added)[:, 0], force[:, 0]
 
 
 def section_at(system: System, name: str, x: float) -> SectionAt | None:
@@ -225,7 +204,7 @@ def section_at(system: System, name: str, x: float) -> SectionAt | None:
     # A position at a node up to rounding is at the node.
     e = int(np.clip(np.searchsorted(nodes, x + 1e-12 * nodes[-1], side="right") - 1, 0, nodes.size - 2))
     z = min(max((x - nodes[e]) / (nodes[e + 1] - nodes[e]), 0.0), 1.0)
-    part = _meshed(described, body, [(e, np.array([z]))])
+    part = _meshed(described, body, [z], slice(e, e + 1))
     contacts = contacts_of(system, described)
     if contacts is not None:
         place = contacts.inside(place, np.array([e]))
@@ -239,7 +218,7 @@ def _stations(described: FlexibleBeam | AssumedModesBeam, system: System) -> _Be
     if isinstance(described, FlexibleBeam):
         mesh = described.mesh
         pieces = max(_ELEMENT_PIECES, -(-_BEAM_PIECES // mesh.n_elements))
-        at = [(e, np.linspace(0.0, 1.0, pieces + 1)) for e in range(mesh.n_elements)]
+        at = np.linspace(0.0, 1.0, pieces + 1).tolist()
         return _meshed(described, body, at)._replace(contacts=contacts_of(system, described))
     pieces = max(_BEAM_PIECES, _ELEMENT_PIECES * described.shapes.count)
     return _assumed(described, body, np.linspace(0.0, 1.0, pieces + 1) * described.length)
@@ -257,32 +236,30 @@ def _assumed(described: AssumedModesBeam, body: BodyCoordinates, x: Array) -> _B
     return _Beam(body.name, x, [(described.section, described.material)] * x.size, moment, force)
 
 
-def _meshed(beam: FlexibleBeam, body: BodyCoordinates, at: Sequence[_Places]) -> _Beam:
-    """Return the data of a beam at positions in some elements, without contacts."""
+def _meshed(beam: FlexibleBeam, body: BodyCoordinates, fractions: Sequence[float], which: slice = slice(None)) -> _Beam:
+    """Return the data of a beam at fractions of its elements, or of some of them, without contacts."""
     mesh, D, spans = beam.mesh, body.integrals.D, beam.spans
     sections = per_span(beam.section, mesh.n_spans, "section")
     materials = per_span(beam.material, mesh.n_spans, "material")
-    elements = np.concatenate([np.full(z.size, e) for e, z in at])
-    owners = mesh.spans[elements]
-    lengths = np.diff(mesh.nodes)
+    elements, count = np.arange(mesh.n_elements)[which], len(fractions)
     first, last = (mesh.shape_at_node(node)[0][0] @ D for node in (0, mesh.n_elements))
-    bend, stretch = (np.array([getattr(spans[span], name) for span in mesh.spans])
-                     for name in ("bending_stiffness", "axial_stiffness"))  # fmt: skip
-    x = np.concatenate([mesh.nodes[e] + z * lengths[e] for e, z in at])
-
-    def rows(shape: Shape, derivative: int, stiffness: Array) -> Array:
-        each = [stiffness[e] * shape(e, z * lengths[e], derivative) for e, z in at]
-        return np.concatenate(each) @ D
-
+    bend, stretch, mass = (
+        np.array([getattr(spans[span], name) for span in mesh.spans])
+        for name in ("bending_stiffness", "axial_stiffness", "mass_per_length")
+    )
+    lengths = np.diff(mesh.nodes)
+    z, owners = np.array(fractions) * lengths[elements, None], mesh.spans[np.repeat(elements, count)]
+    curvature = mesh.transverse_at(fractions, 2)[which] @ D
+    resisted = piece_rows(inertia_moments(beam, body), np.repeat(elements, count), z.ravel())
     part = _Beam(
-        body.name, x, [(sections[span], materials[span]) for span in owners],
-        rows(mesh.transverse_rows, 2, bend), None,
-        resisted=piece_rows(inertia_moments(beam, body), elements, x - mesh.nodes[elements]),
+        body.name, (mesh.nodes[elements, None] + z).ravel(), [(sections[span], materials[span]) for span in owners],
+        np.hstack([(bend[elements, None, None] * curvature).reshape(z.size, -1), resisted]), None,
     )  # fmt: skip
-    if _stretches(body, last - first, np.sum(lengths / stretch)):
-        mass = np.array([spans[span].mass_per_length for span in owners])
-        part = part._replace(force=rows(mesh.axial_rows, 1, stretch), change=_change(beam, D, at, mass))
-    return part
+    if not _stretches(body, last - first, np.sum(lengths / stretch)):
+        return part
+    strain = stretch[elements, None, None] * (mesh.axial_at(fractions, 1)[which] @ D)
+    change = (mass[elements, None, None] * _change(mesh, D, fractions)[which]).reshape(z.size, -1)
+    return part._replace(force=np.hstack([strain.reshape(z.size, -1), change]))
 
 
 def _stretches(body: BodyCoordinates, lengthened: Array, flexibility: float) -> bool:
@@ -291,27 +268,35 @@ def _stretches(body: BodyCoordinates, lengthened: Array, flexibility: float) -> 
     return bool(part >= _STRETCHES * np.real(flexibility))
 
 
-def _change(beam: FlexibleBeam, D: Array, at: Sequence[_Places], mass: Array) -> _Change:
-    """Return integrals from each element's first node to its stations, less their means over the element."""
-    mesh = beam.mesh
-    along, across, place, one = [], [], [], []
-    for e, z in at:
-        length = mesh.nodes[e + 1] - mesh.nodes[e]
-        # First to the stations, then the mean over the element, 1/l int (l - x) dx.
-        x = np.outer(z, 0.5 * (GAUSS_PLACES + 1.0)) * length
-        weights = np.outer(z, 0.5 * GAUSS_WEIGHTS) * length
-        whole, share = 0.5 * (GAUSS_PLACES + 1.0) * length, 0.25 * GAUSS_WEIGHTS * (1.0 - GAUSS_PLACES) * length
+def _change(mesh: BeamMesh, D: Array, fractions: Sequence[float]) -> Array:
+    """Return c per mass per length and feature, less its mean over the element: (elements, fractions, features)."""
+    nodes, lengths, z = mesh.nodes[:-1, None, None], np.diff(mesh.nodes)[:, None, None], np.array(fractions)[:, None]
+    along, across = (
+        (shape(fractions, -1) - shape((1.0,), -2) / lengths) @ D for shape in (mesh.axial_at, mesh.transverse_at)
+    )
+    place = nodes * lengths * (z - 0.5) + lengths**2 * (0.5 * z**2 - 1.0 / 6.0)
+    return np.concatenate([along, -across, lengths * (z - 0.5), -place], axis=2)
 
-        def changed(values: Array, mean: Array, weights: Array = weights, share: Array = share) -> Array:
-            values = values.reshape(weights.shape + values.shape[1:])
-            return np.einsum("sg,sg...->s...", weights, values) - np.tensordot(share, mean, 1)
 
-        for rows, shape in ((along, mesh.axial_rows), (across, mesh.transverse_rows)):
-            there, mean = (shape(e, places) @ D for places in (x.ravel(), whole))
-            rows.append(changed(there, mean))
-        place.append(changed(mesh.nodes[e] + x.ravel(), mesh.nodes[e] + whole))
-        one.append(changed(np.ones(x.size), np.ones(whole.size)))
-    return _Change(mass, *(np.concatenate(each) for each in (along, across, place, one)))
+def _features(system: System, body: BodyCoordinates, q: Array, v: Array, a: Array) -> Array:
+    """Return the features of a beam's motion (k, 3 nf + 2) on which the loads of its sections depend linearly.
+
+    These are the coordinates u, the accelerations u'' - phi'^2 u and phi'' u + 2 phi' u' of the deflection, that of the
+    origin along the beam, less gravity, and phi'^2.
+    """
+    phi, w, dw = q[:, body.angle], v[:, body.angle, None], a[:, body.angle, None]
+    u, du, ddu = (x[:, body.flexible] for x in (q, v, a))
+    pulled = a[:, body.position] - np.array(system.mechanism.gravity)
+    frame = np.cos(phi) * pulled[:, 0] + np.sin(phi) * pulled[:, 1]
+    return np.hstack([u, ddu - w**2 * u, dw * u + 2.0 * w * du, frame[:, None], w**2])
+
+
+def _linear_loads(part: _Beam, features: Array) -> tuple[Array, Array]:
+    """Return moment and axial force (k, s) at a beam's stations, without those of joints that slide along it."""
+    moment = features[:, : part.moment.shape[1]] @ part.moment.T
+    if part.force is None:
+        return moment, np.full(moment.shape, np.nan)
+    return moment, features[:, : part.force.shape[1]] @ part.force.T
 
 
 def _loads(
@@ -319,17 +304,16 @@ def _loads(
 ) -> SectionLoads:
     """Return the loads of a beam's stations, then of its sections under joints that slide along it."""
     x, *kinds = (np.broadcast_to(each, (len(q), each.size)) for each in sections)
-    u, contacts = q[:, system.body(part.body).flexible], part.contacts
-    force = _axial(system, part, q, v, a)
-    across = _across(system.body(part.body), q, v, a)
-    resisted = 0.0 if part.resisted is None else across @ part.resisted.T
+    body, contacts = system.body(part.body), part.contacts
+    features = _features(system, body, q, v, a)
+    moment, force = _linear_loads(part, features)
     if contacts is None:
-        return SectionLoads(u @ part.moment.T + resisted, force, x, *kinds)
-    load = contacts.load(system, q, multipliers)
+        return SectionLoads(moment, force, x, *kinds)
+    load, nf = contacts.load(system, q, multipliers), body.nf
     place = load.place
     # Deflection without the quasi-static part of the contact forces, whose exact moments are added instead.
-    u = u - load.deflected
-    moment = np.hstack([u @ part.moment.T + resisted, contacts.moment(place, u, across)])
+    moment = moment - load.deflected @ part.moment[:, :nf].T
+    moment = np.hstack([moment, contacts.moment(place, features[:, :nf] - load.deflected, features[:, nf : 2 * nf])])
     elements = np.repeat(np.arange(len(contacts.stiffness)), len(sections[0]) // len(contacts.stiffness))
     inside = contacts.inside(sections[0], elements)
     moment += contacts.moments(np.hstack([np.broadcast_to(inside, x.shape), place]), load)
@@ -338,32 +322,3 @@ def _loads(
     kinds = [np.hstack([each, np.take_along_axis(each, left, 1)]) for each in kinds]
     force = np.hstack([force, (1.0 - weight) * before + weight * after])
     return SectionLoads(moment, force, np.hstack([x, place]), *kinds)
-
-
-def _across(body: BodyCoordinates, q: Array, v: Array, a: Array) -> Array:
-    """Return the acceleration across the beam (k, nf) per shape: u'' - phi'^2 u."""
-    return a[:, body.flexible] - v[:, body.angle, None] ** 2 * q[:, body.flexible]
-
-
-def _axial(system: System, part: _Beam, q: Array, v: Array, a: Array) -> Array:
-    """Return the axial force at a beam's stations."""
-    body = system.body(part.body)
-    u = q[:, body.flexible]
-    if part.force is None:
-        return np.full((len(q), len(part.moment)), np.nan)
-    force = u @ part.force.T
-    if part.change is None:
-        return force
-    change = part.change
-    phi, w, dw = q[:, body.angle], v[:, body.angle, None], a[:, body.angle, None]
-    du, ddu = v[:, body.flexible], a[:, body.flexible]
-    pulled = a[:, body.position] - np.array(system.mechanism.gravity)
-    frame = (np.cos(phi) * pulled[:, 0] + np.sin(phi) * pulled[:, 1])[:, None]
-    resisted = (
-        frame * change.one
-        - dw * (u @ change.across.T)
-        - w**2 * (change.place + u @ change.along.T)
-        - 2.0 * w * (du @ change.across.T)
-        + ddu @ change.along.T
-    )
-    return force + change.mass * resisted

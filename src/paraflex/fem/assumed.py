@@ -147,12 +147,8 @@ def assumed_integrals(shapes: AssumedShapes, span: SpanProperties, lumps: Sequen
     N, slopes = np.zeros((everywhere.size, 2, shapes.count), kind), np.zeros((places.size, shapes.count), kind)
     N[:, 0, n:], N[:, 1, :n], slopes[:, :n] = along @ stretched, across @ bent, turns @ bent
     roots = np.asarray(scipy.linalg.block_diag(bending @ bent, stretch @ stretched))
-    return bar_integrals(
-        zip(everywhere.tolist(), N, masses.tolist(), strict=True),
-        zip(slopes, inertias.tolist(), strict=True),
-        roots.T @ roots,
-        np.asarray(scipy.linalg.block_diag(bent, stretched)),
-    )
+    D = np.asarray(scipy.linalg.block_diag(bent, stretched))
+    return bar_integrals(everywhere, N, masses, slopes, inertias, roots.T @ roots, D)
 
 
 def _columns(functions: Sequence[ShapeFunction], z: Array, derivative: int) -> Array:

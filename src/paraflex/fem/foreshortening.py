@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from paraflex.arrays import Array
-from .integrals import GAUSS_PLACES, GAUSS_POINTS, GAUSS_WEIGHTS, Lump, SpanProperties
+from .integrals import GAUSS_FRACTIONS, GAUSS_PLACES, GAUSS_POINTS, GAUSS_WEIGHTS, Lump, SpanProperties
 from .mesh import BeamMesh
 
 
@@ -60,30 +60,25 @@ def mass_points(mesh: BeamMesh, spans: Sequence[SpanProperties], lumps: Sequence
     basis : (n_nodal, nf) array
         Nodal coordinates per flexible coordinate.
     """
-    n, g = mesh.n_elements, GAUSS_POINTS
-    lengths = np.diff(mesh.nodes)
-    x, mass, rows, slopes = [], [], [], []
-    weights = np.zeros((n * g + len(lumps), n * g), dtype=lengths.dtype)
+    n, g, lengths, at = mesh.n_elements, GAUSS_POINTS, np.diff(mesh.nodes), [lump.node for lump in lumps]
+    weights = np.zeros((n * g + len(at), n * g), dtype=lengths.dtype)
     for e, length in enumerate(lengths):
-        local = 0.5 * length * (GAUSS_PLACES + 1.0)
-        rows.append(np.stack([mesh.axial_rows(e, local) @ basis, mesh.transverse_rows(e, local) @ basis], axis=1))
-        slopes.append(mesh.transverse_rows(e, local, derivative=1) @ basis)
-        x.append(mesh.nodes[e] + local)
-        mass.append(0.5 * length * GAUSS_WEIGHTS * spans[mesh.spans[e]].mass_per_length)
         own = slice(e * g, (e + 1) * g)
         weights[own, : e * g] = node_weights(mesh, e)[: e * g]
-        weights[own, own] = 0.5 * length * _cumulative(GAUSS_PLACES)
-    for k, lump in enumerate(lumps):
-        weights[n * g + k] = node_weights(mesh, lump.node)
-        shape, slope = mesh.shape_at(mesh.nodes[lump.node])
-        rows.append((shape @ basis)[None])
-        slopes.append((slope @ basis)[None])
+        weights[own, own] = 0.5 * length * _CUMULATIVE
+    for k, node in enumerate(at):
+        weights[n * g + k] = node_weights(mesh, node)
+    density = np.array([[spans[span].mass_per_length] for span in mesh.spans])
+    N = np.stack([mesh.axial_at(GAUSS_FRACTIONS), mesh.transverse_at(GAUSS_FRACTIONS)], axis=2)
+    slopes = mesh.transverse_at(GAUSS_FRACTIONS, 1).reshape(n * g, -1)
+    x = mesh.nodes[:-1, None] + lengths[:, None] * np.array(GAUSS_FRACTIONS)
+    shapes = [mesh.shape_at_node(node) for node in at]
     return MassPoints(
-        x=np.concatenate([*x, [mesh.nodes[lump.node] for lump in lumps]]),
-        mass=np.concatenate([*mass, [lump.mass for lump in lumps]]),
-        inertia=np.concatenate([np.zeros(n * g), [lump.inertia for lump in lumps]]),
-        N=np.concatenate(rows),
-        slope=np.concatenate(slopes),
+        x=np.append(x, mesh.nodes[at]),
+        mass=np.append(0.5 * lengths[:, None] * GAUSS_WEIGHTS * density, [lump.mass for lump in lumps]),
+        inertia=np.append(np.zeros(n * g), [lump.inertia for lump in lumps]),
+        N=np.concatenate([N.reshape(n * g, 2, -1), *(shape[None] for shape, _ in shapes)]) @ basis,
+        slope=np.concatenate([slopes, *(slope[None] for _, slope in shapes)]) @ basis,
         weights=weights,
     )
 
@@ -128,3 +123,6 @@ def _cumulative(z: Array) -> Array:
     coefficients = np.linalg.inv(legendre.legvander(z, z.size - 1))
     integrals = legendre.legint(coefficients, lbnd=-1, axis=0)
     return np.asarray(legendre.legval(z, integrals).T, dtype=float)
+
+
+_CUMULATIVE = _cumulative(GAUSS_PLACES)

@@ -1,6 +1,6 @@
 """Inertia shape integrals and stiffness of a body: the constants of its equations of motion (Eqs. 13-28)."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 
@@ -13,6 +13,8 @@ from .reference import ReferenceCondition, reference_basis
 # N^T N is of degree 10 in x, exact with six Gauss points.
 GAUSS_POINTS = 6
 GAUSS_PLACES, GAUSS_WEIGHTS = np.polynomial.legendre.leggauss(GAUSS_POINTS)
+# The same as fractions of an element.
+GAUSS_FRACTIONS: tuple[float, ...] = tuple((0.5 * (GAUSS_PLACES + 1.0)).tolist())
 
 
 @dataclass(frozen=True)
@@ -179,72 +181,58 @@ def _beam_integrals(
     condition: ReferenceCondition,
 ) -> ShapeIntegrals:
     mesh = BeamMesh(np.array(nodes), np.array(spans_of), {}, separate)
-    points, stiffness = _quadrature(mesh, spans)
-    points += [(mesh.nodes[lump.node], mesh.shape_at_node(lump.node)[0], lump.mass) for lump in lumps]
-    turning = [(np.eye(mesh.n_nodal)[mesh.slope_column(lump.node)], lump.inertia) for lump in lumps]
-    nodal = bar_integrals(points, turning, stiffness, np.eye(mesh.n_nodal))
+    x, N, masses, stiffness = _quadrature(mesh, spans)
+    at = [lump.node for lump in lumps]
+    x, masses = np.append(x, mesh.nodes[at]), np.append(masses, [lump.mass for lump in lumps])
+    N = np.concatenate([N, *(mesh.shape_at_node(node)[0][None] for node in at)])
+    slopes = np.eye(mesh.n_nodal)[[mesh.slope_column(node) for node in at]]
+    inertias = np.array([lump.inertia for lump in lumps])
+    nodal = bar_integrals(x, N, masses, slopes, inertias, stiffness, np.eye(mesh.n_nodal))
     return nodal.in_basis(reference_basis(mesh, condition, nodal.Mff, stiffness))
 
 
 def bar_integrals(
-    points: Iterable[tuple[float, Array, float]],
-    turning: Iterable[tuple[Array, float]],
-    stiffness: Array,
-    basis: Array,
+    x: Array, N: Array, masses: Array, slopes: Array, inertias: Array, stiffness: Array, basis: Array
 ) -> ShapeIntegrals:
     """Compute the shape integrals of a straight bar as sums over its mass points.
 
     Parameters
     ----------
-    points : iterable of (x, N, dm)
-        Position along the bar [m], displacement per coordinate (2, n) and mass [kg] of each mass point.
-    turning : iterable of (slope, J)
-        Slope row (n,) and lumped moment of inertia [kg m^2] of each lump.
+    x, N, masses : (k,), (k, 2, n) and (k,) arrays
+        Position along the bar [m], displacement per coordinate and mass [kg] of each mass point.
+    slopes, inertias : (j, n) and (j,) arrays
+        Slope row and lumped moment of inertia [kg m^2] of each lump.
     stiffness : (n, n) array
         Elastic stiffness K.
     basis : (own, n) array
         Body's own coordinates per coordinate, D.
     """
-    n, points, turning = stiffness.shape[0], list(points), list(turning)
-    masses, inertias = np.array([(x, dm) for x, _, dm in points]), np.array([J for _, J in turning])
-    kind = np.result_type(stiffness, masses, inertias, basis)
-    m, I0, S1 = 0.0, 0.0, np.zeros(2, kind)
-    S2, I1, I2 = np.zeros((2, n), kind), np.zeros(n, kind), np.zeros((n, n), kind)
-    G1, G2 = np.zeros(n, kind), np.zeros((n, n), kind)
-    for x, N, dm in points:
-        m += dm
-        S1[0] += dm * x
-        S2 += dm * N
-        I0 += dm * x * x
-        # s0 = [x, 0] and E^T = [[0, 1], [-1, 0]].
-        I1 += dm * x * N[0]
-        I2 += dm * (N.T @ N)
-        G1 += dm * x * N[1]
-        across = np.outer(N[0], N[1])
-        G2 += dm * (across - across.T)
-
-    J = sum((inertia for _, inertia in turning), 0.0)
-    Jf = sum((inertia * slope for slope, inertia in turning), np.zeros(n, kind))
-    Jff = sum((inertia * np.outer(slope, slope) for slope, inertia in turning), np.zeros((n, n), kind))
+    along, across, first = N[:, 0], N[:, 1], masses * x
+    coupled = (masses * along.T) @ across
+    # s0 = [x, 0] and E^T = [[0, 1], [-1, 0]].
     return ShapeIntegrals(
-        m=m, S1=S1, S2=S2, I0=I0, I1=I1, I2=I2, G1=G1, G2=G2, J=J, Jf=Jf, Jff=Jff, K=stiffness, D=basis
+        m=masses.sum(), S1=np.array([first.sum(), 0.0]), S2=np.array([masses @ along, masses @ across]),
+        I0=first @ x, I1=first @ along, I2=(masses * along.T) @ along + (masses * across.T) @ across,
+        G1=first @ across, G2=coupled - coupled.T, J=inertias.sum(), Jf=inertias @ slopes,
+        Jff=(inertias * slopes.T) @ slopes, K=stiffness, D=basis,
+    )  # fmt: skip
+
+
+def _quadrature(mesh: BeamMesh, spans: Sequence[SpanProperties]) -> tuple[Array, Array, Array, Array]:
+    """Return position, shape matrix and mass of the mass points of a beam, and the nodal stiffness matrix (Eq. 28)."""
+    lengths = np.diff(mesh.nodes)[:, None]
+    weights = 0.5 * lengths * GAUSS_WEIGHTS
+    of_elements = [spans[span] for span in mesh.spans]
+    density, stretch, bend = (
+        np.array([[getattr(span, name)] for span in of_elements])
+        for name in ("mass_per_length", "axial_stiffness", "bending_stiffness")
     )
-
-
-def _quadrature(mesh: BeamMesh, spans: Sequence[SpanProperties]):
-    """Return the mass points (x, N, dm) along the beam and the nodal stiffness matrix (Eq. 28)."""
-    points = []
-    kind = np.result_type(mesh.nodes, *(np.array([span.axial_stiffness, span.bending_stiffness]) for span in spans))
-    stiffness = np.zeros((mesh.n_nodal, mesh.n_nodal), kind)
-    for e in range(mesh.n_elements):
-        span = spans[mesh.spans[e]]
-        length = mesh.nodes[e + 1] - mesh.nodes[e]
-        x, weight = 0.5 * length * (GAUSS_PLACES + 1.0), 0.5 * length * GAUSS_WEIGHTS
-        axial, transverse = mesh.axial_rows(e, x), mesh.transverse_rows(e, x)
-        strain, curvature = mesh.axial_rows(e, x, derivative=1), mesh.transverse_rows(e, x, derivative=2)
-        stiffness += span.axial_stiffness * (strain.T * weight) @ strain
-        stiffness += span.bending_stiffness * (curvature.T * weight) @ curvature
-        for k in range(x.size):
-            N = np.vstack([axial[k], transverse[k]])
-            points.append((mesh.nodes[e] + x[k], N, weight[k] * span.mass_per_length))
-    return points, stiffness
+    strain, curvature = (
+        rows.reshape(-1, mesh.n_nodal)
+        for rows in (mesh.axial_at(GAUSS_FRACTIONS, 1), mesh.transverse_at(GAUSS_FRACTIONS, 2))
+    )
+    stiffness = (strain.T * (stretch * weights).ravel()) @ strain
+    stiffness = stiffness + (curvature.T * (bend * weights).ravel()) @ curvature
+    N = np.stack([mesh.axial_at(GAUSS_FRACTIONS), mesh.transverse_at(GAUSS_FRACTIONS)], axis=2)
+    x = mesh.nodes[:-1, None] + lengths * np.array(GAUSS_FRACTIONS)
+    return x.ravel(), N.reshape(-1, 2, mesh.n_nodal), (density * weights).ravel(), stiffness

@@ -2,13 +2,23 @@
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
 import numpy as np
 
 from paraflex.arrays import Array, Indices
 from paraflex.errors import InputError
 from paraflex.limits import ELEMENTS, at_most
-from .element import AXIAL, COORDINATES_PER_NODE, CURVATURE, SLOPE, TRANSVERSE, axial_shape, transverse_shape
+from .element import (
+    AXIAL,
+    COORDINATES_PER_NODE,
+    CURVATURE,
+    SLOPE,
+    TRANSVERSE,
+    axial_shape,
+    transverse_powers,
+    transverse_shape,
+)
 
 # Two points closer than this fraction of the beam are one node: a shorter element is an input error.
 COINCIDENT_POINTS = 1e-9
@@ -96,6 +106,34 @@ class BeamMesh:
         """Return the transverse displacement per nodal coordinate, or a derivative: see `axial_rows`."""
         return self.scatter(element, transverse_shape(x, self.nodes[element + 1] - self.nodes[element], derivative))
 
+    def axial_at(self, fractions: Sequence[float], derivative: int = 0) -> Array:
+        """Return the axial displacement per nodal coordinate, or a derivative, at fractions of every element.
+
+        Parameters
+        ----------
+        fractions : sequence of float
+            Positions as fractions of the length of each element.
+        derivative : int
+            Order of the derivative: see `element.axial_shape`.
+
+        Returns
+        -------
+        (elements, places, n_nodal) array
+            Rows, shared by equal meshes and read-only.
+        """
+        return _rows_at(tuple(self.nodes.tolist()), self.separate, tuple(fractions), derivative, True)
+
+    def transverse_at(self, fractions: Sequence[float], derivative: int = 0) -> Array:
+        """Return the transverse displacement per nodal coordinate, or a derivative: see `axial_at`."""
+        return _rows_at(tuple(self.nodes.tolist()), self.separate, tuple(fractions), derivative, False)
+
+    def transverse_powers(self) -> Array:
+        """Return the transverse displacement per nodal coordinate: (elements, 6, n_nodal).
+
+        Entries are coefficients of ascending powers of the distance from the element's first node.
+        """
+        return np.array([self.scatter(e, transverse_powers(length)) for e, length in enumerate(np.diff(self.nodes))])
+
     def rows_of(self, coordinate: int) -> Indices:
         """Return the indices of one of the four coordinates at every node."""
         return np.arange(coordinate, COORDINATES_PER_NODE * self.nodes.size, COORDINATES_PER_NODE)
@@ -132,6 +170,18 @@ class BeamMesh:
     def slope_column(self, node: int) -> int:
         """Return the index of a node's slope."""
         return self.column(node, SLOPE)
+
+
+@lru_cache(maxsize=256)
+def _rows_at(
+    nodes: tuple[float, ...], separate: tuple[int, ...], fractions: tuple[float, ...], derivative: int, axial: bool
+) -> Array:
+    mesh = BeamMesh(np.array(nodes), np.arange(len(nodes) - 1), {}, separate)
+    lengths = np.diff(mesh.nodes)[:, None]
+    shape = (axial_shape if axial else transverse_shape)(lengths * np.array(fractions), lengths, derivative)
+    rows = np.array([mesh.scatter(e, each) for e, each in enumerate(shape)])
+    rows.setflags(write=False)
+    return rows
 
 
 def mesh_beam(length: float, points: Mapping[str, float], elements: int | Sequence[int] = 1) -> BeamMesh:

@@ -9,6 +9,9 @@ from paraflex.arrays import Array
 from .eigen import eigenpairs
 from .integrals import ShapeIntegrals
 
+# Entries of a mode above this part of the largest count as largest.
+_LARGEST = 1.0 - 1e-6
+
 
 @dataclass(frozen=True)
 class ModalBasis:
@@ -48,8 +51,11 @@ def modal_basis(body: ShapeIntegrals) -> ModalBasis:
     if body.nf == 0:
         return ModalBasis(omega=np.zeros(0), vectors=np.zeros((0, 0)))
     squares, vectors = eigenpairs(body.K, body.Mff)
-    # A mode's sign is arbitrary; with the largest entry positive, results are the same on every machine.
-    largest = vectors[np.argmax(np.abs(vectors), axis=0), np.arange(vectors.shape[1])]
+    # A mode's sign is arbitrary; with the largest entry positive, results are the same on every machine. In a symmetric
+    # body several entries are largest, up to rounding: the first counts.
+    sizes = np.abs(vectors)
+    first = np.argmax(sizes > _LARGEST * np.max(sizes, axis=0), axis=0)
+    largest = vectors[first, np.arange(vectors.shape[1])]
     return ModalBasis(omega=np.sqrt(np.maximum(squares, 0.0)), vectors=vectors * np.sign(np.real(largest)))
 
 

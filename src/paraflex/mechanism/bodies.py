@@ -216,7 +216,7 @@ class FlexibleBeam(DeformableBody):
             separate |= {mesh.points[lump.point] for lump in self.lumps if lump.inertia > 0.0} | {mesh.n_elements}
         return mesh.with_separate_curvature(separate)
 
-    @property
+    @cached_property
     def spans(self) -> tuple[SpanProperties, ...]:
         """Mass and stiffness of every span.
 

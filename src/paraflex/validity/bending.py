@@ -8,7 +8,7 @@ from paraflex.arrays import Array
 from paraflex.dynamics import BodyCoordinates, System
 from paraflex.fem import ReferenceCondition
 from paraflex.fem.element import AXIAL
-from paraflex.fem.integrals import GAUSS_PLACES, GAUSS_POINTS, GAUSS_WEIGHTS
+from paraflex.fem.integrals import GAUSS_FRACTIONS, GAUSS_POINTS, GAUSS_WEIGHTS
 from paraflex.integrators import Solution
 from paraflex.kernel.packed import POINT
 from paraflex.mechanism import AssumedModesBeam, Body, FlexibleBeam
@@ -89,12 +89,11 @@ def _line(body: BodyCoordinates, described: Body) -> _Line:
         mesh, spans = described.mesh, described.spans
         lengths = np.diff(mesh.nodes)
         weights = (0.5 * lengths[:, None] * GAUSS_WEIGHTS).ravel()
-        places = [0.5 * length * (GAUSS_PLACES + 1.0) for length in lengths]
-        rows = [mesh.transverse_rows(e, x, derivative=1) for e, x in enumerate(places)]
         stretch = np.diff(D[mesh.rows_of(AXIAL)], axis=0) / lengths[:, None]
         stiffness = np.array([spans[span].axial_stiffness for span in mesh.spans])
         each = np.repeat(np.arange(lengths.size), GAUSS_POINTS)
-        return _Line(weights, np.concatenate(rows) @ D, stretch[each], stiffness[each])
+        slopes = mesh.transverse_at(GAUSS_FRACTIONS, 1).reshape(each.size, -1) @ D
+        return _Line(weights, slopes, stretch[each], stiffness[each])
     if isinstance(described, AssumedModesBeam):
         shapes = described.shapes
         x, weights = shapes.quadrature()
