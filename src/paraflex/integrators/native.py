@@ -148,7 +148,7 @@ class NativeRun:
             q=state.q.copy(),
             v=state.v.copy(),
             a=state.stage_a[1, 0].copy(),
-            multipliers=state.stage_lam[0].copy(),
+            multipliers=state.stage_lam[1, 0].copy(),
             work=float(state.clock[at.WORK]),
         )
 

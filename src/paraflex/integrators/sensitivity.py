@@ -221,7 +221,7 @@ def _chunks(run: NativeRun) -> Iterator[_Chunk]:
             restart |= bool(state.counts[at.FAILURES] == 2)
             continue
         history.t[count], history.h[count], history.restart[count] = before, state.clock[at.LAST_STEP], restart
-        history.a[count], history.lam[count] = state.stage_a[0], state.stage_lam
+        history.a[count], history.lam[count] = state.stage_a[0], state.stage_lam[0]
         count, restart = count + 1, bool(np.any(jumps == state.clock[at.TIME]))
         if count == _STEPS_AT_ONCE or restart:
             yield _Chunk(history, count, signals)

@@ -145,7 +145,7 @@ def note_forces(controls, h, march):
     """Record the largest multipliers, and their changes by local errors within some cycles."""
     forgotten = exp(-h / (controls.force_cycles * march.clock[at.CYCLE]))
     for r in range(march.guess_lam.size):
-        march.forces[at.PEAK, r] = max(march.forces[at.PEAK, r], abs(march.stage_lam[0, r]))
+        march.forces[at.PEAK, r] = max(march.forces[at.PEAK, r], abs(march.stage_lam[1, 0, r]))
         if march.counts[at.NEAR] == 0:
             march.forces[at.RECENT, r] = forgotten * march.forces[at.RECENT, r] + march.forces[at.LOCAL, r]
             unresolved = max(march.forces[at.RECENT, r], LOST_SHARE * march.forces[at.LOST, r])

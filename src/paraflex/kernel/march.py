@@ -47,7 +47,7 @@ SAME_STEP = 1e-11
 @routine
 def first_stage(system, signals, t, controls, march, work):
     """Solve for accelerations and multipliers at (t, q, v) to rounding, as the first stage."""
-    a, lam = march.stage_a[1, 0], march.stage_lam[0]
+    a, lam = march.stage_a[1, 0], march.stage_lam[1, 0]
     note_friction(system, march.q, march.v, work.mu, work.compliance)
     factor_bodies(system, 0.0, march.q, work)
     orient(system, march.q, work, controls.dependent_part)
@@ -89,7 +89,7 @@ def begin(system, signals, controls, march, work):
     t = march.clock[at.TIME]
     march.counts[at.JUMPED] = 0
     first_stage(system, signals, t, controls, march, work)
-    a, lam = march.stage_a[1, 0], march.stage_lam[0]
+    a, lam = march.stage_a[1, 0], march.stage_lam[1, 0]
     # Starting guesses must not extrapolate across a jump: stages before it do not count as other times.
     fill(march.stage_t[0], t)
     march.stage_t[1, 0] = t
@@ -128,7 +128,7 @@ def resume(system, signals, controls, march, work, aside):
 def start(system, signals, controls, march, work, out):
     """Compute the first stage and the first sample of a run."""
     begin(system, signals, controls, march, work)
-    t, a, lam = march.clock[at.TIME], march.stage_a[1, 0], march.stage_lam[0]
+    t, a, lam = march.clock[at.TIME], march.stage_a[1, 0], march.stage_lam[1, 0]
     kinetic, strain, march.clock[at.WEIGHT_0] = stored_energy(system, march.q, march.v, lam, work.scratch)
     march.clock[at.ENERGY_0] = kinetic + strain
     if out.times.size > 0 and out.times[0] <= t:
@@ -200,13 +200,14 @@ def accept(system, signals, tableau, controls, t, h, march, work, out, aside):
     copy(march.stage_t[1], march.stage_t[0])
     for s in range(last + 1):
         copy(march.stage_a[1, s], march.stage_a[0, s])
+        copy(march.stage_lam[1, s], march.stage_lam[0, s])
     march.stage_t[1, 0] = t + h
     copy(march.q, march.stage_q[0])
     copy(march.v, march.stage_v[0])
     copy(march.stage_d[last], march.stage_d[0])
     copy(march.algorithmic[1], march.algorithmic[0])
     copy(march.stage_a[0, last], march.stage_a[1, 0])
-    copy(march.stage_lam[last], march.stage_lam[0])
+    copy(march.stage_lam[1, last], march.stage_lam[1, 0])
     march.power[0] = march.power[last]
     march.counts[at.STEPS] += 1
     march.counts[at.FAILURES] = 0
@@ -215,7 +216,7 @@ def accept(system, signals, tableau, controls, t, h, march, work, out, aside):
         march.counts[at.PREPARED] = 0
     note_forces(controls, h, march)
     note_cycle(system, controls, march)
-    kinetic, strain, weight = stored_energy(system, march.q, march.v, march.stage_lam[0], work.scratch)
+    kinetic, strain, weight = stored_energy(system, march.q, march.v, march.stage_lam[1, 0], work.scratch)
     done = march.clock[at.WORK] + weight - march.clock[at.WEIGHT_0]
     balance = abs(kinetic + strain - march.clock[at.ENERGY_0] - done)
     march.clock[at.BALANCE] = max(march.clock[at.BALANCE], balance)

@@ -94,14 +94,15 @@ def wilson_end(theta, h, march, work):
         a1[j] = a0[j] + (found[j] - a0[j]) / theta
         work.q[j] = march.q[j] + h * march.v[j] + h * h / 6.0 * (2.0 * a0[j] + a1[j])
         work.v[j] = march.v[j] + 0.5 * h * (a0[j] + a1[j])
-    for r in range(march.stage_lam.shape[1]):
-        march.stage_lam[1, r] = march.stage_lam[0, r] + (march.stage_lam[1, r] - march.stage_lam[0, r]) / theta
+    lam = march.stage_lam[1]
+    for r in range(lam.shape[1]):
+        lam[1, r] = lam[0, r] + (lam[1, r] - lam[0, r]) / theta
 
 
 @routine
 def allow_acceleration(system, signals, t, a, march, work):
     """Change an acceleration to the nearest one that satisfies the constraints at work.q and work.v."""
-    equations(system, signals, t, INDEX_1, work.q, work.v, a, march.stage_lam[1], march.torques, work)
+    equations(system, signals, t, INDEX_1, work.q, work.v, a, march.stage_lam[1, 1], march.torques, work)
     for r in range(work.rows.size):
         if system.rows[r].kind != CONSTRAINT:
             work.rows[r] = 0.0

@@ -146,31 +146,35 @@ def solve_steps_to_rounding(system, signals, tableau, controls, count, history, 
             weights = baumgarte_weights(controls, controls.alpha, controls.beta, 0.0)
             history.left[k] = solve_to_rounding(
                 system, signals, t, 0.0, 0.0, weights, controls.dependent_part, march, march.stage_a[1, 0],
-                march.stage_lam[0], history.least, direction, space, work,
+                march.stage_lam[1, 0], history.least, direction, space, work,
             )  # fmt: skip
-            march.power[0] = input_power(system, signals, t, march.q, march.v, march.stage_lam[0], march.torques, work)
+            march.power[0] = input_power(
+                system, signals, t, march.q, march.v, march.stage_lam[1, 0], march.torques, work
+            )
         copy(march.q, march.stage_q[0])
         copy(march.v, march.stage_v[0])
         if march.counts[at.SAMPLE] == 0 and out.times[0] <= t:
             copy(march.q, out.q[0])
             copy(march.v, out.v[0])
             copy(march.stage_a[1, 0], out.a[0])
-            copy(march.stage_lam[0], out.lam[0])
+            copy(march.stage_lam[1, 0], out.lam[0])
             out.energy[0, 2] = weight_work(system, march.q, work.scratch)
             march.counts[at.SAMPLE] = 1
         weights = baumgarte_weights(controls, controls.alpha, controls.beta, h)
         for i in range(1, last + 1):
             time, g, b = stage_start(tableau, i, t, h, march)
             copy(history.a[k, i], march.stage_a[1, i])
-            copy(history.lam[k, i], march.stage_lam[i])
+            copy(history.lam[k, i], march.stage_lam[1, i])
             left = solve_to_rounding(
                 system, signals, time, g, b, weights, controls.dependent_part, march, march.stage_a[1, i],
-                march.stage_lam[i], history.least, direction, space, work,
+                march.stage_lam[1, i], history.least, direction, space, work,
             )  # fmt: skip
             history.left[k] = max(history.left[k], left)
             copy(work.q, march.stage_q[i])
             copy(work.v, march.stage_v[i])
-            march.power[i] = input_power(system, signals, time, work.q, work.v, march.stage_lam[i], march.torques, work)
+            march.power[i] = input_power(
+                system, signals, time, work.q, work.v, march.stage_lam[1, i], march.torques, work
+            )
         long = samples.is_long(system, tableau, controls, h)
         if long:
             samples.power_along_curve(system, signals, tableau, t, h, march, work)
@@ -178,7 +182,7 @@ def solve_steps_to_rounding(system, signals, tableau, controls, count, history, 
             copy(march.stage_q[i], history.q[k, i])
             copy(march.stage_v[i], history.v[k, i])
             copy(march.stage_a[1, i], history.a[k, i])
-            copy(march.stage_lam[i], history.lam[k, i])
+            copy(march.stage_lam[1, i], history.lam[k, i])
             history.power[k, i] = march.power[i]
         first, g = samples.place_samples(tableau, t, h, long, march, out), tableau.A[last, last] * h
         for i in range(first, march.counts[at.SAMPLE]):
@@ -197,7 +201,7 @@ def solve_steps_to_rounding(system, signals, tableau, controls, count, history, 
         copy(march.stage_q[last], march.q)
         copy(march.stage_v[last], march.v)
         copy(march.stage_a[1, last], march.stage_a[1, 0])
-        copy(march.stage_lam[last], march.stage_lam[0])
+        copy(march.stage_lam[1, last], march.stage_lam[1, 0])
         march.power[0] = march.power[last]
 
 

@@ -8,6 +8,8 @@ from .compiling import by_reference
 
 # Largest number of singular positions recorded in a run.
 MOST_PASSAGES = 1000
+# Number of stages from which the guess of the next stage is extrapolated.
+GUESS_FROM = 3
 # Return codes of `march`.
 PAUSED, FINISHED, NO_CONVERGENCE, NOT_FINITE, ERROR_TEST = range(5)
 # Further return code of `attempt`: the step comes near a singular position, and its start is to be prepared.
@@ -79,8 +81,8 @@ class March(NamedTuple):
     stage_v: Annotated[Floats, "stages", "n"]
     stage_d: Annotated[Floats, "stages", "n"]  # q' at the stages: stage_v itself, except in stabilised index 2
     shift: Annotated[Floats, "shifted"]  # in stabilised index 2, else empty
-    stage_a: Annotated[Floats, 2, "stages", "n"]
-    stage_lam: Annotated[Floats, "stages", "m"]
+    stage_a: Annotated[Floats, 2, "stages", "n"]  # in the last accepted step and in this one
+    stage_lam: Annotated[Floats, 2, "stages", "m"]
     power: Annotated[Floats, "stages"]
     qs: Annotated[Floats, "n"]  # explicit parts of a stage
     vs: Annotated[Floats, "n"]
@@ -92,8 +94,8 @@ class March(NamedTuple):
     algorithmic: Annotated[Floats, 2, "n"]  # algorithmic accelerations of the Newmark family, last and this step
     passages: Annotated[Floats, 2, MOST_PASSAGES]  # start and end of intervals around singular positions
     opening: Annotated[Floats, "n"]  # direction that opens the row nearest to dependence, near a singular position
-    guess_t: Annotated[Floats, 3]  # times of the stages a guess is extrapolated from
-    guess_s: Annotated[Ints, 3, 2]  # their indices in stage_a
+    guess_t: Annotated[Floats, GUESS_FROM]  # times of the stages a guess is extrapolated from
+    guess_s: Annotated[Ints, GUESS_FROM, 2]  # their indices in stage_a
 
 
 @by_reference

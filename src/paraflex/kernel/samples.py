@@ -71,7 +71,7 @@ def place_samples(tableau, t, h, long, march, out):
                 march.stage_q[s0, j], march.stage_v[s0, j], march.stage_a[1, s0, j],
                 march.stage_q[s1, j], march.stage_v[s1, j], march.stage_a[1, s1, j], width, x,
             )  # fmt: skip
-        interpolate_nodes(tableau, (time - t) / h, march.stage_lam, out.lam[i])
+        interpolate_nodes(tableau, (time - t) / h, march.stage_lam[1], out.lam[i])
         if long:
             interpolate_nodes(tableau, (time - t) / h, march.stage_q, out.q[i])
             differentiate_nodes(tableau, (time - t) / h, h, march.stage_q, out.v[i])
@@ -227,7 +227,7 @@ def power_along_curve(system, signals, tableau, t, h, march, work):
         differentiate_nodes(tableau, tableau.c[i], h, march.stage_q, work.v)
         note_torques(signals, time, march.torques)
         march.power[i] = input_power(
-            system, signals, time, march.stage_q[i], work.v, march.stage_lam[i], march.torques, work
+            system, signals, time, march.stage_q[i], work.v, march.stage_lam[1, i], march.torques, work
         )
 
 

@@ -19,7 +19,7 @@ from .joints import line_energy, load_power, marker_angle, modal_damping_power
 from .linear import SINGULAR_PART, orient
 from .newmark import newmark_end, newmark_start
 from .packed import INDEX_1
-from .run_state import ENTERS, GGL, NO_CONVERGENCE, NOT_FINITE, PAUSED, POSITION, PROJECTION
+from .run_state import ENTERS, GGL, GUESS_FROM, NO_CONVERGENCE, NOT_FINITE, PAUSED, POSITION, PROJECTION
 from .signals import evaluate_signal
 from .stage import CONVERGED, SINGULAR, SLOW, WORST_CONTRACTION, place, solve_stage
 
@@ -58,36 +58,49 @@ def input_power(system, signals, t, q, v, lam, torques, work):
 
 
 @routine
-def predict(i, t, h, march):
-    """Extrapolate the accelerations of the last three stages, as starting guess for stage i at time t."""
-    stages = march.stage_v.shape[0]
-    a, times, rows = march.stage_a[1, i], march.guess_t, march.guess_s
+def nearest_stages(i, t, h, march):
+    """Find the stages of this step and the last one that are nearest to a time t, for guesses of stage i.
+
+    Their number is returned, their times and indices are in march.guess_t and march.guess_s, the nearest first.
+    """
+    stages, times, rows = march.stage_v.shape[0], march.guess_t, march.guess_s
     found = 0
-    # Search this step's stages, the latest first, then those of the last step.
     for k in range(i + stages):
-        step, j = (1, i - 1 - k) if k < i else (0, stages - 1 - (k - i))
-        distinct = found < 3
+        # Of stages at one time the latest counts.
+        step, s = (1, i - 1 - k) if k < i else (0, stages - 1 - (k - i))
+        time, place = march.stage_t[step, s], found
+        while place > 0 and abs(time - t) < abs(times[place - 1] - t):
+            place -= 1
         for l in range(found):
-            if abs(march.stage_t[step, j] - times[l]) < SAME_TIME * h:
-                distinct = False
-        if distinct:
-            times[found], rows[found, 0], rows[found, 1] = march.stage_t[step, j], step, j
-            found += 1
-    fill(a, 0.0)
+            if abs(time - times[l]) < SAME_TIME * h:
+                place = GUESS_FROM
+        if place < GUESS_FROM:
+            found = min(found + 1, GUESS_FROM)
+            for l in range(found - 1, place, -1):
+                times[l], rows[l, 0], rows[l, 1] = times[l - 1], rows[l - 1, 0], rows[l - 1, 1]
+            times[place], rows[place, 0], rows[place, 1] = time, step, s
+    return found
+
+
+@routine
+def extrapolate(values, found, t, march, out):
+    """Evaluate the polynomial through values (2, stages, k) at the stages of `nearest_stages` at a time."""
+    times, rows = march.guess_t, march.guess_s
+    fill(out, 0.0)
     for k in range(found):
         weight = 1.0
         for l in range(found):
             if l != k:
                 weight *= (t - times[l]) / (times[k] - times[l])
-        source = march.stage_a[rows[k, 0], rows[k, 1]]
-        for j in range(a.size):
-            a[j] += weight * source[j]
+        source = values[rows[k, 0], rows[k, 1]]
+        for j in range(out.size):
+            out[j] += weight * source[j]
 
 
 @routine
 def renew_factor(system, b, march, work):
     """Factor the bodies for stages with this b at the current deformation."""
-    note_all_axial_forces(system, march.q, march.v, march.stage_a[1, 0], march.stage_lam[0], work, work.geometric)
+    note_all_axial_forces(system, march.q, march.v, march.stage_a[1, 0], march.stage_lam[1, 0], work, work.geometric)
     factor_bodies(system, b, march.q, work)
     march.counts[at.FACTORS] += 1
     march.clock[at.FACTOR_B], march.clock[at.CONTRACTION] = b, WORST_CONTRACTION
@@ -206,12 +219,16 @@ def attempt(system, signals, tableau, controls, t, h, march, work, slow):
         march.stage_t[1, i] = t + tableau.c[i] * h
         held, lag = near.trust(weights, g, b, x - t, march)
         if rounds == 0:
-            predict(i, x, h, march)
-            copy(march.stage_lam[i - 1], march.stage_lam[i])
+            found = nearest_stages(i, x, h, march)
+            extrapolate(march.stage_a, found, x, march, march.stage_a[1, i])
+            # Near a singular position multipliers have a pole.
+            if march.counts[at.NEAR] > 0:
+                found = 1
+            extrapolate(march.stage_lam, found, x, march, march.stage_lam[1, i])
             fill(march.shift, 0.0)
         status, iterations, contraction = solve_stage(
-            system, signals, x, g, b, weights, march.qs, march.vs, march.stage_a[1, i], march.stage_lam[i], march.shift,
-            march.torques, newton_tolerance, newton_memory, march.clock[at.CONTRACTION],
+            system, signals, x, g, b, weights, march.qs, march.vs, march.stage_a[1, i], march.stage_lam[1, i],
+            march.shift, march.torques, newton_tolerance, newton_memory, march.clock[at.CONTRACTION],
             controls.dependent_part, march.counts[at.NEAR] > 0, held, lag, march.forces[at.PEAK], force_tolerance, work,
         )  # fmt: skip
         march.counts[at.ITERATIONS] += iterations
@@ -223,7 +240,7 @@ def attempt(system, signals, tableau, controls, t, h, march, work, slow):
                 continue
             near.note_position(march.stage_t[1, i], t, h, march)
             # The constraints do not determine the accelerations here, so they are extrapolated.
-            predict(i, x, h, march)
+            extrapolate(march.stage_a, nearest_stages(i, x, h, march), x, march, march.stage_a[1, i])
             place(march.qs, march.vs, g, b, march.stage_a[1, i], march.shift, work)
         elif status != CONVERGED:
             if fresh and perhaps_near and march.counts[at.NEAR] == 0 and not at_singular:
@@ -254,7 +271,7 @@ def attempt(system, signals, tableau, controls, t, h, march, work, slow):
             for j in range(march.q.size):
                 march.stage_d[i, j] = work.v[j] + march.shift[j] / g
         march.power[i] = input_power(
-            system, signals, march.stage_t[1, i], work.q, work.v, march.stage_lam[i], march.torques, work
+            system, signals, march.stage_t[1, i], work.q, work.v, march.stage_lam[1, i], march.torques, work
         )
         i += 1
     march.clock[at.STAGE_G], march.clock[at.STAGE_B] = g, b
