@@ -61,7 +61,7 @@ def dense(flat, widths, p):
 def test_operations_are_those_that_the_kernels_do(task, geometry):
     run = iteration.half_way(task.remodelled(task.mechanism.with_geometry(geometry)), 1e-4, 3)
     p, state, ws = run.problem.system.packed, run.state, run.workspace
-    motion = (state.q, state.v, state.stage_a[1, 0], state.stage_lam[0], state.torques)
+    motion = (state.q, state.v, state.stage_a[1, 0], state.stage_lam[1, 0], state.torques)
     # Entries that are zero for straight beams count as well: the formulas are those of any body.
     columns, products = dense(p.columns, p.bodies["width"], p), dense(p.products, 2 * p.bodies["stride"], p)
     p = p._replace(columns=columns, products=products)

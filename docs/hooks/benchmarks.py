@@ -89,6 +89,25 @@ def startup(data: dict[str, Any]) -> str:
     )
 
 
+def history(data: dict[str, Any]) -> str:
+    """Times, rates and sizes by commit."""
+    columns = data["columns"]
+    return _table(
+        ("Commit", "Of", *(title for title, _ in columns.values())),
+        [
+            (
+                f"`{line['commit'][:8]}`",
+                line["committed"],
+                *(
+                    format(line["figures"][name], form) if name in line["figures"] else ""
+                    for name, (_, form) in columns.items()
+                ),
+            )
+            for line in reversed(data["lines"])
+        ],
+    )
+
+
 def paths_and_modes(data: dict[str, Any]) -> str:
     """Tracking errors of all paths and modes, during the motion and over the whole run [mm]."""
     models = {"second_order": "Second order", "exact": "Exact beams", "linear": "The paper's linear beams"}
@@ -311,7 +330,7 @@ def _table(headings: tuple[str, ...], rows: list[tuple[str, ...]]) -> str:
 
 
 # Files of times; the others hold lengths, which do not depend on the machine.
-TIMED = ("peers", "batch", "startup", "method_times", "default_method", "real_time", "scaling")
+TIMED = ("peers", "batch", "startup", "history", "method_times", "default_method", "real_time", "scaling")
 # Files with runs by other engines.
 ENGINES = ("peers", "batch", "paths_and_modes", "model_agreement", "library_agreement")
 # What a page may ask for: the file of the measurements, and what makes the table of it.
@@ -319,6 +338,7 @@ TABLES: dict[str, tuple[str, Callable[[dict[str, Any]], str]]] = {
     "peers": ("peers", peers),
     "batch": ("batch", batch),
     "startup": ("startup", startup),
+    "history": ("history", history),
     "paths_and_modes": ("paths_and_modes", paths_and_modes),
     "table_3": ("paths_and_modes", table_3),
     "model_agreement": ("model_agreement", model_agreement),

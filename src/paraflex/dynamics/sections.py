@@ -17,7 +17,7 @@ Cook, Malkus, Plesha, Witt (2002), Concepts and Applications of Finite Element A
 between nodes superposed on the results of nodal displacements).
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -103,14 +103,25 @@ class Sections:
 
     def loads(self, system: System, q: Array, v: Array, a: Array, multipliers: Array) -> SectionLoads:
         """Return the loads of sections for coordinates (k, n), their derivatives, and the multipliers (k, m)."""
-        still, moving, first = [], [], 0
-        for part in self.parts:
-            own = slice(first, first := first + len(part.moment))
-            sections = tuple(each[own] for each in (self.x, self.area, self.modulus, self.strength))
-            found = _loads(system, part, sections, q, v, a, multipliers)
+        still, moving = [], []
+        for part, found in self._parts_loads(system, q, v, a, multipliers):
             still.append(SectionLoads(*(each[:, : len(part.moment)] for each in found)))
             moving.append(SectionLoads(*(each[:, len(part.moment) :] for each in found)))
         return SectionLoads(*(np.concatenate(each, axis=1) for each in zip(*still, *moving, strict=True)))
+
+    def largest_stress(self, system: System, q: Array, v: Array, a: Array, multipliers: Array) -> Array:
+        """Return the largest stress in any section (k,) [Pa]; sections without a known outermost fibre do not count."""
+        found = self._parts_loads(system, q, v, a, multipliers)
+        return np.max([np.max(np.nan_to_num(loads.stress), axis=1) for _, loads in found], axis=0)
+
+    def _parts_loads(
+        self, system: System, q: Array, v: Array, a: Array, multipliers: Array
+    ) -> "Iterator[tuple[_Beam, SectionLoads]]":
+        first = 0
+        for part in self.parts:
+            own = slice(first, first := first + len(part.moment))
+            sections = tuple(each[own] for each in (self.x, self.area, self.modulus, self.strength))
+            yield part, _loads(system, part, sections, q, v, a, multipliers)
 
     @property
     def owners(self) -> tuple[str, ...]:

@@ -7,6 +7,7 @@ loads are computed again; the requested samples are kept.
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -29,7 +30,7 @@ _PART_OF_STEP = 0.25
 # Largest number of coordinates of all samples together, for memory.
 _MOST_NUMBERS = 4_000_000
 # Numbers of one kind of load that are processed at a time, to fit into the processor's cache.
-_AT_A_TIME = 20_000
+_AT_A_TIME = 8_000
 # Negligible loads: stress [MPa], and forces as a part of the total weight.
 _NO_STRESS, _NO_FORCE = 1e-3, 1e-3
 _GRAVITY = 9.81
@@ -140,11 +141,8 @@ def _largest_loads(system: System, solution: Solution) -> Iterator[tuple[str, st
     motion = solution.q, solution.v, solution.a, multipliers
     sections = sections_of(system)
     if sections is not None and np.isfinite(sections.modulus).any():
-
-        def stress(q: Array, v: Array, a: Array, multipliers: Array) -> Array:
-            return np.nan_to_num(sections.loads(system, q, v, a, multipliers).stress)
-
-        yield "the stress", "MPa", 1e-6 * _largest(stress, motion, len(sections.owners))
+        widest = max(len(part.x) for part in sections.parts)
+        yield "the stress", "MPa", 1e-6 * _largest(partial(sections.largest_stress, system), motion, widest)
     # Forces have poles at singular positions.
     if solution.singular_positions:
         return
@@ -153,7 +151,7 @@ def _largest_loads(system: System, solution: Solution) -> Iterator[tuple[str, st
 
         def force(q: Array, v: Array, a: Array, multipliers: Array) -> Array:
             none = np.zeros((len(q), len(system.mechanism.motors)))
-            return np.linalg.norm(joint_loads(system, names, q, multipliers, none).force, axis=2)
+            return np.max(np.hypot(*np.moveaxis(joint_loads(system, names, q, multipliers, none).force, 2, 0)), axis=1)
 
         yield "the force in a joint", "N", _largest(force, motion, 2 * len(names))
     for one, effort in zip(system.mechanism.prescribed, drive_torques(system, multipliers).T, strict=True):
@@ -162,13 +160,10 @@ def _largest_loads(system: System, solution: Solution) -> Iterator[tuple[str, st
 
 
 def _largest(loads: Callable[..., Array], motion: Sequence[Array], width: int) -> Array:
-    """Return the largest of the loads (j, width) at each of k samples (k,), computed for some samples at a time."""
+    """Return the loads at k samples (k,), computed for some at a time, each with so many numbers."""
     count = max(_AT_A_TIME // width, 1)
-    parts = [
-        np.max(loads(*(each[first : first + count] for each in motion)), axis=1)
-        for first in range(0, len(motion[0]), count)
-    ]
-    return np.concatenate(parts)
+    parts = range(0, len(motion[0]), count)
+    return np.concatenate([loads(*(each[first : first + count] for each in motion)) for first in parts])
 
 
 def _pieces(t: Array, loads: Array, enough: float) -> float:
