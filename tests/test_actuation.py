@@ -4,14 +4,17 @@ from __future__ import annotations
 
 from dataclasses import replace
 from itertools import pairwise
+from math import factorial
 
 import numpy as np
 import pytest
 import scipy.optimize
+from scipy.interpolate import make_interp_spline
 
 import twins
 from conftest import make_five_bar
 from paraflex.actuation import actuation_condition, allocate, required_effort
+from paraflex.actuation.quintic import quintic_splines
 from paraflex.dynamics import build_system, constant_signals, pack_signals, piecewise_quintic
 from paraflex.errors import ActuationError, InputError, SingularActuationError
 from paraflex.kernel.signals import evaluate_signal
@@ -317,6 +320,23 @@ def test_condition_is_large_near_a_singularity(raparm):
 
 
 # --- Torques in time -----------------------------------------------------------------------------------------------
+
+
+def test_quintic_splines_are_those_of_scipy():
+    """Each by itself, the shortest possible among them; unevenly spaced, where the ends have no knots."""
+    generator, sizes = np.random.default_rng(5), np.array([6, 7, 12, 40])
+    x = np.cumsum(generator.uniform(0.5, 1.5, sizes.sum()))
+    y = generator.standard_normal((x.size, 3))
+    starts, coefficients = quintic_splines(x, y, sizes)
+    for end, size in zip(np.cumsum(sizes), sizes, strict=True):
+        spline = make_interp_spline(x[end - size : end], y[end - size : end], k=5)
+        places = np.unique(spline.t)[:-1]
+        first = np.searchsorted(starts, places[0])
+        np.testing.assert_array_equal(starts[first : first + places.size], places)
+        for order, found in enumerate(coefficients[:, first : first + places.size]):
+            expected = spline(places, order) / factorial(order)
+            # Rounding, times the condition of the equations for the basis.
+            np.testing.assert_allclose(found, expected, rtol=0.0, atol=1e-12 * np.max(np.abs(expected)))
 
 
 @pytest.mark.parametrize("signs", TABLE_1)

@@ -168,7 +168,7 @@ def test_runs_that_fail_say_why_when_and_what_to_do(monkeypatch, says, remedy, f
     # Of forces that may be given few are so large that a run of them fails.
     monkeypatch.setattr("paraflex.limits.LARGEST", math.inf)
     # The pace of methods of other packages is taken of 20 000 attempts, of which the same is said.
-    monkeypatch.setattr(sys.modules["paraflex.integrators.integrate"], "_WINDOW_OUTSIDE", 1_000)
+    monkeypatch.setattr(sys.modules["paraflex.integrators.integration"], "_WINDOW_OUTSIDE", 1_000)
     with pytest.raises(IntegrationError) as caught:
         run(pendulum(force), **options)
     error = caught.value

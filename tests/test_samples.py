@@ -18,7 +18,7 @@ from shell import paraflex
 PAGE = Path(__file__).parents[1] / "docs" / "quick-return.md"
 CODE = "samples-coarse"
 # The module, which the package's function of the same name hides.
-integrate = importlib.import_module("paraflex.integrators.integrate")
+integrate = importlib.import_module("paraflex.integrators.integration")
 
 
 @pytest.fixture(scope="module")

@@ -67,6 +67,35 @@ def test_help_imports_nothing_heavy():
     assert python("-c", HELP, *HEAVY)[-1] == "[]"
 
 
+# Prints packages and modules that a command has imported, and how many functions Numba has prepared for compiling.
+COMMAND = """
+import gc, sys
+from paraflex.cli.app import app
+try:
+    app(["info", "raparm_i"])
+except SystemExit:
+    pass
+from paraflex.kernel.compiling import Routine
+routines = [each for each in gc.get_objects() if isinstance(type(each), type) and Routine in type(each).__mro__]
+print(len(routines), sum("inner" in vars(each) for each in routines), *set(sys.argv) & set(sys.modules))
+"""
+
+
+def test_describing_a_mechanism_needs_neither_the_time_loop_nor_what_compiles():
+    unneeded = [f"scipy.{name}" for name in ("fft", "integrate", "interpolate", "optimize", "spatial", "special")]
+    unneeded += ["matplotlib", "xarray", "paraflex.integrators.integration", "paraflex.kernel.march", "paraflex.motion"]
+    # The first process compiles what is not in the cache yet.
+    for _ in range(2):
+        routines, prepared, *found = python("-c", COMMAND, *unneeded)[-1].split()
+    assert int(routines) > 100
+    assert (prepared, found) == ("0", [])
+
+
+def test_methods_are_listed_without_mechanisms():
+    look = "import sys, paraflex.cli.methods; print(*set(sys.argv) & set(sys.modules))"
+    assert python("-c", look, "scipy.linalg", "paraflex.dynamics", "paraflex.mechanism", "pydantic") == []
+
+
 def test_describing_the_library_imports_nothing_that_only_runs_need():
     look = "import sys; from paraflex.cli.inspect import library; library(); print(*set(sys.argv) & set(sys.modules))"
     unneeded = ("matplotlib", "xarray", "netCDF4", "scipy.interpolate", "scipy.integrate", "scipy.optimize")

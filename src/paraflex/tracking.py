@@ -35,7 +35,7 @@ from .dynamics import (
 from .dynamics.points import PointMotion, marker_position, point_motion
 from .errors import InputError, IntegrationError, ResultWarning, as_enum
 from .findings import Finding, warn_of
-from .integrators import IntegrationOptions, Method, Solution, check_times, choose, integrate
+from .integrators import IntegrationOptions, Method, Solution, check_times, choose
 from .integrators.beam_ends import leave_beam
 from .integrators.between import SAMPLES
 from .kinematics import ModelWithPaths, Path, RigidMotion, path_follower
@@ -434,6 +434,9 @@ def simulate(
     run_of = partial(
         TrackingRun, task, torques, actuation_condition(task.effort, torques.mode), method=options.method.title
     )
+    # Plans are made and checked without the code that integrates.
+    from .integrators import integrate
+
     march = partial(integrate, options=options, samples=task.motion.t.size, on_progress=on_progress)
     try:
         if task.holds:

@@ -3,10 +3,8 @@
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
-from math import factorial
 
 import numpy as np
-import scipy
 
 from paraflex.arrays import Array
 from paraflex.dynamics import InputSignals
@@ -14,8 +12,8 @@ from paraflex.errors import Moment, NumericalError
 from paraflex.kinematics import RigidMotion
 from paraflex.mechanism import ActuationMode
 from .allocation import PAST_SINGULAR, Effort, allocate, required_effort
+from .quintic import DEGREE, quintic_splines
 
-_DEGREE = 5
 # Largest error of the spline, as a fraction of the peak torque of the run.
 _SPLINE_ERROR = 1e-8
 # Least factor by which halving the interval reduces the error; it is 2^6 for smooth torques.
@@ -55,7 +53,7 @@ class FeedForward:
         for signal in self.signals:
             piece = np.clip(np.searchsorted(signal.breaks, t, side="right") - 1, 0, len(signal.coefficients) - 1)
             x = t - signal.breaks[piece]
-            columns.append(sum(signal.coefficients[piece, power] * x**power for power in range(_DEGREE + 1)))
+            columns.append(sum(signal.coefficients[piece, power] * x**power for power in range(DEGREE + 1)))
         return np.column_stack(columns)
 
     def shaped(self, delays: Array, weights: Array) -> "FeedForward":
@@ -85,7 +83,7 @@ def _delayed(times: Array, delays: Array) -> Array:
 def _shaped(signal: InputSignals, delays: Array, weights: Array) -> InputSignals:
     """Return the sum of delayed copies of a piecewise polynomial, exactly: with pieces between all delayed breaks."""
     breaks = _delayed(signal.breaks, delays)
-    middle, coefficients = 0.5 * (breaks[1:] + breaks[:-1]), np.zeros((breaks.size - 1, _DEGREE + 1))
+    middle, coefficients = 0.5 * (breaks[1:] + breaks[:-1]), np.zeros((breaks.size - 1, DEGREE + 1))
     for delay, weight in zip(delays, weights, strict=True):
         piece = np.searchsorted(signal.breaks, middle - delay, side="right") - 1
         inside = piece >= 0
@@ -99,8 +97,8 @@ def _shaped(signal: InputSignals, delays: Array, weights: Array) -> InputSignals
 def about(coefficients: Array, places: Array) -> Array:
     """Return the coefficients (k, 6) of polynomials about other origins (k,), by repeated Horner's scheme."""
     out = coefficients.T.copy()
-    for order in range(_DEGREE):
-        for power in range(_DEGREE - 1, order - 1, -1):
+    for order in range(DEGREE):
+        for power in range(DEGREE - 1, order - 1, -1):
             out[power] += places * out[power + 1]
     return out.T
 
@@ -226,15 +224,13 @@ def splines(t: Array, values: Array, knots: Array, before: Array | None = None) 
     before : (j, columns) array, optional
         Values just before each knot, where they may jump; continuous by default.
     """
-    breaks, coefficients = [], []
     edges = np.searchsorted(t, knots)
-    for end, (a, b) in enumerate(pairwise(edges), start=1):
-        last = values[b] if before is None else before[end]
-        spline = scipy.interpolate.make_interp_spline(t[a : b + 1], np.vstack([values[a:b], last]), k=_DEGREE)
-        start = np.unique(spline.t)[:-1]
-        breaks.append(start)
-        # Taylor coefficients at the left end of every piece: (6, pieces, motors).
-        coefficients.append(np.stack([spline(start, nu) / factorial(nu) for nu in range(_DEGREE + 1)]))
-    x = np.append(np.concatenate(breaks), t[-1])
-    joined = np.concatenate(coefficients, axis=1)
-    return [InputSignals(x, np.ascontiguousarray(joined[:, :, j].T)) for j in range(values.shape[1])]
+    # Each spline has both of its end points.
+    sizes = np.diff(edges) + 1
+    points = np.arange(sizes.sum()) - np.repeat(np.arange(sizes.size), sizes) + edges[0]
+    through = values[points]
+    if before is not None:
+        through[np.cumsum(sizes) - 1] = before[1:]
+    starts, coefficients = quintic_splines(t[points], through, sizes)
+    x = np.append(starts, t[-1])
+    return [InputSignals(x, np.ascontiguousarray(coefficients[:, :, j].T)) for j in range(values.shape[1])]

@@ -20,7 +20,6 @@ from paraflex.dynamics import (
     joint_coordinate,
     mobility,
     natural_frequencies,
-    standing_system,
     undeformed,
 )
 from paraflex.dynamics.linearise import BALANCED as BALANCED, LOWEST
@@ -86,7 +85,7 @@ def examine(mechanism: Mechanism, assembly: str | None = None) -> Examination:
     """
     mechanism = standing(mechanism, assembly)
     system, rigid = build_system(mechanism), build_system(mechanism.rigid())
-    starts = tuple(closure_of(standing_system(rigid.mechanism, one.name), one) for one in mechanism.assemblies)
+    starts = tuple(closure_of(_begun_at(rigid, one.name), one) for one in mechanism.assemblies)
     if not mechanism.assemblies:
         return Examination(system, rigid, starts, None, None, None)
     requested = mechanism.assembly(assembly)
@@ -98,6 +97,12 @@ def examine(mechanism: Mechanism, assembly: str | None = None) -> Examination:
         return Examination(system, rigid, starts, chosen, free, driven_freedoms(rigid, chosen.state, free.freedoms))
     except ProportionError as error:
         return Examination(system, rigid, starts, chosen, None, None, str(error))
+
+
+def _begun_at(rigid: System, assembly: str) -> System:
+    """Return the system with prescribed motions that begin at an assembly, the given one if none does."""
+    mechanism = standing(rigid.mechanism, assembly)
+    return rigid if mechanism is rigid.mechanism else build_system(mechanism)
 
 
 def pose_findings(seen: Examination, *, at_rest: bool = True) -> Iterator[Finding]:

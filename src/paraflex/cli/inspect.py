@@ -45,7 +45,6 @@ from paraflex.mechanism import (
     grouped,
     loops,
 )
-from paraflex.motion import UNBALANCED
 from .collected import printed
 from .commands.models import InfoRequest
 from .inspect_tables import print_facts, print_library
@@ -63,6 +62,8 @@ def frequencies(
         try:
             state = static_equilibrium(system, state, motors)
         except AssemblyError as error:
+            from paraflex.motion import UNBALANCED
+
             raise InputError(error.cause, field="--balanced", remedy=UNBALANCED) from error
     held = natural_frequencies(system, state, motors, count=LOWEST) if motors else None
     free = natural_frequencies(system, state, torque_at=motors, count=LOWEST)

@@ -131,7 +131,7 @@ ForceRows = Annotated[list[Triple], BeforeValidator(lambda value: value, json_sc
 
 
 class _Table(BaseModel):
-    model_config: ClassVar[ConfigDict] = ConfigDict(extra="forbid", frozen=True)
+    model_config: ClassVar[ConfigDict] = ConfigDict(extra="forbid", frozen=True, defer_build=True)
 
     if TYPE_CHECKING:
         # Fields that follow from a class are known at run time only.
@@ -407,7 +407,7 @@ class PrescribedTable(_Table):
 class AssemblyTable(BaseModel):
     """Approximate angles of bodies by name, and positions of points that determine the other angles."""
 
-    model_config: ClassVar[ConfigDict] = ConfigDict(extra="allow", frozen=True)
+    model_config: ClassVar[ConfigDict] = ConfigDict(extra="allow", frozen=True, defer_build=True)
     __pydantic_extra__: dict[str, Number] = Field(init=False)  # pyright: ignore[reportIncompatibleVariableOverride]
 
     extra_description: ClassVar[str] = "the angle of the body in rad"

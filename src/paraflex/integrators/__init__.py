@@ -1,27 +1,8 @@
-"""Time integration: methods as objects, own schemes by tableaux and coefficients, adapters to SciPy and SUNDIALS."""
+"""Time integration: methods as objects, own schemes by tableaux and coefficients, adapters to SciPy and SUNDIALS.
 
-from .events import (
-    DeflectionLimit as DeflectionLimit,
-    Event as Event,
-    JointLimit as JointLimit,
-    SingularDistance as SingularDistance,
-    check_events as check_events,
-)
-from .integrate import integrate as integrate
-from .methods import (
-    DEFAULT_METHOD as DEFAULT_METHOD,
-    METHODS as METHODS,
-    Method as Method,
-    Treatment as Treatment,
-    find_method as find_method,
-)
-from .options import (
-    Control as Control,
-    IntegrationOptions as IntegrationOptions,
-    TolerancePer as TolerancePer,
-    check_times as check_times,
-    choose as choose,
-    loose_tolerance as loose_tolerance,
-)
-from .run import make_problem as make_problem
-from .solution import Solution as Solution
+Names are imported at first use, so that methods are listed and checked without the code that integrates.
+"""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
 import scipy
@@ -11,9 +12,11 @@ from paraflex.dynamics import State, System
 from paraflex.errors import InputError, Moment, UnreachablePathError
 from paraflex.findings import Finding
 from paraflex.mechanism import AtEnd
-from .crossing import Crossing, first_crossing
 from .event_functions import EventFunction, beam_end_functions
 from .events import BeamEnd
+
+if TYPE_CHECKING:
+    from .crossing import Crossing
 
 
 @dataclass(frozen=True)
@@ -53,9 +56,12 @@ class BeamEnds:
         self.functions: tuple[EventFunction, ...] = tuple(within)
 
     def after_crossing(
-        self, crossing: Crossing, functions: Sequence[EventFunction]
-    ) -> tuple[tuple[EventFunction, ...], Crossing | None]:
+        self, crossing: "Crossing", functions: Sequence[EventFunction]
+    ) -> "tuple[tuple[EventFunction, ...], Crossing | None]":
         """Return the events that remain after a crossing, and the crossing that ends the run in this step or None."""
+        # Plans check their motions without running anything.
+        from .crossing import first_crossing
+
         left, found = tuple(functions), crossing
         while found is not None and not found.function.ends_run:
             self._left += (Departure(found.function, found.t),)

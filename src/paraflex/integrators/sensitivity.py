@@ -19,7 +19,7 @@ from paraflex.kernel.sensitivity import make_piece, sensitivity_steps
 from paraflex.kernel.sensitivity_samples import DIFFERENCE_STEP, PLACES, Sensitivity
 from paraflex.kernel.tangent import make_tangent
 from .beam_ends import STAY_ON_BEAM, BeamEnds
-from .integrate import CAUSES
+from .integration import CAUSES
 from .methods import METHODS, Family, Treatment
 from .native import NativeRun, prepare
 from .options import IntegrationOptions

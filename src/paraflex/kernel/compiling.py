@@ -1,7 +1,7 @@
 """Decorators that compile kernels: cached on disk, free to reorder sums, with or without own changes to Numba."""
 
 from collections.abc import Callable
-from functools import update_wrapper
+from functools import cached_property, update_wrapper
 from types import FunctionType
 from typing import Any
 
@@ -27,49 +27,68 @@ _OPTIONS: dict[str, Any] = {"error_model": "numpy", "fastmath": FAST_MATH}
 _INNER: dict[str, Any] = {"no_cpython_wrapper": True}
 
 
-def routine(function: Callable[..., Any]) -> Any:
-    """Decorate a function that only kernels call; a call from Python would crash the process."""
-    return compiled(function, **_OPTIONS, **_INNER)
+class Routine:
+    """Function that only kernels call, compiled with the first kernel that calls it.
 
-
-def inlined(function: Callable[..., Any]) -> Any:
-    """Decorate a function that only kernels call, once per body in an inner loop, and that is inlined."""
-    return compiled(function, **_OPTIONS, **_INNER, forceinline=True)
-
-
-class Kernel:
-    """Function for Python and for other kernels, compiled for each at its first call.
+    Numba takes longer to prepare a function for compiling than to load a kernel, and most kernels come from the cache.
 
     Attributes
     ----------
-    from_python : numba dispatcher
-        Version that Python calls.
-    inner : numba dispatcher
-        Version that other kernels call.
+    py_func : function
+        Undecorated Python function.
     """
 
     def __init__(self, function: Callable[..., Any], **options: Any) -> None:
         assert isinstance(function, FunctionType)
-        update_wrapper(self, function)
+        update_wrapper(self, function)  # pyright: ignore[reportArgumentType]
+        self.py_func: Any = function
+        self._options = options
+
+    @cached_property
+    def inner(self) -> Any:
+        """Numba's dispatcher of the version that kernels call."""
+        return compiled(self.py_func, **_OPTIONS, **_INNER, **self._options)
+
+    @property
+    def signatures(self) -> list[Any]:
+        """Signatures for which the function has been compiled."""
+        return list(self.inner.signatures)
+
+
+def routine(function: Callable[..., Any]) -> Any:
+    """Return a routine made of a function; type checkers see any function."""
+    return Routine(function)
+
+
+def inlined(function: Callable[..., Any]) -> Any:
+    """Return a routine made of a function that kernels call once per body in an inner loop, and that is inlined."""
+    return Routine(function, forceinline=True)
+
+
+class Kernel(Routine):
+    """Function for Python and for other kernels, compiled for each at its first call."""
+
+    def __init__(self, function: Callable[..., Any], **options: Any) -> None:
+        super().__init__(function)
+        self._own = options
+
+    @cached_property
+    def from_python(self) -> Any:
+        """Numba's dispatcher of the version that Python calls."""
+        function = self.py_func
         entry = FunctionType(function.__code__, function.__globals__, function.__name__, function.__defaults__)
         # The cache identifies the function by this name.
-        entry.__qualname__, entry.__module__ = f"{function.__qualname__}_from_python", function.__module__
-        self.from_python: Any = compiled(entry, **_OPTIONS, **options)
-        self.inner: Any = routine(function)
+        entry.__qualname__, entry.__module__ = f"{vars(self)['__qualname__']}_from_python", function.__module__
+        return compiled(entry, **_OPTIONS, **self._own)
 
     def __call__(self, *arguments: Any) -> Any:
         """Call the kernel from Python."""
         return self.from_python(*arguments)
 
     @property
-    def py_func(self) -> Any:
-        """Undecorated Python function."""
-        return self.inner.py_func
-
-    @property
     def signatures(self) -> list[Any]:
         """Signatures for which the kernel has been compiled."""
-        return [*self.from_python.signatures, *self.inner.signatures]
+        return [*self.from_python.signatures, *super().signatures]
 
     @property
     def cache_path(self) -> str:
@@ -77,8 +96,8 @@ class Kernel:
         return str(self.from_python.stats.cache_path)
 
 
-@typeof_impl.register(Kernel)
-def _inner(value: Kernel, _: object) -> types.Dispatcher:
+@typeof_impl.register(Routine)
+def _inner(value: Routine, _: object) -> types.Dispatcher:
     return types.Dispatcher(value.inner)
 
 
