@@ -92,8 +92,9 @@ def array_of(packed: dict[str, Any]) -> np.ndarray:
     raw = zlib.decompress(base64.b64decode(packed["data"]))
     folded = np.frombuffer(raw, dtype=np.uint8).reshape(2, -1).T.copy().view("<u2").reshape(packed["shape"])
     whole = (folded >> 1).astype(np.int16) ^ -(folded & 1).astype(np.int16)
-    for _ in range(packed["order"]):
-        whole = np.cumsum(whole, axis=1, dtype=np.int16)
+    for axis, order in ((2, packed["orders"][1]), (1, packed["orders"][0])):
+        for _ in range(order):
+            whole = np.cumsum(whole, axis=axis, dtype=np.int16)
     values = packed["scale"] * whole + np.array(packed["offset"])
     return np.where(whole == MISSING, np.nan, values)
 

@@ -116,7 +116,8 @@ def test_packages_that_are_missing(study, tmp_path, monkeypatch):
     refused(lambda: task.simulate("++", method="ida"), "method", "SUNDIALS", "pip install")
     monkeypatch.setattr("paraflex.report.page.find_spec", lambda _: None)
     # Once read it is kept.
-    refused(plotly_script.__wrapped__, "plotly", "not installed, or without its script", "--force-reinstall plotly")
+    whole = partial(plotly_script.__wrapped__, whole=True)
+    refused(whole, "plotly", "not installed, or without its script", "--force-reinstall plotly")
 
 
 def test_workers_with_another_installation(study):

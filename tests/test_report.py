@@ -1,8 +1,10 @@
 """The report's file: it holds the dataset's numbers, breaks on no name, loads nothing, and says what failed."""
 
+import base64
 import json
 import re
 import shlex
+import zlib
 from pathlib import Path
 
 import numpy as np
@@ -11,9 +13,11 @@ import xarray as xr
 
 from paraflex import formatting
 from paraflex.errors import InputError, OutputError
+from paraflex.figures.charts import Axis, Panel
 from paraflex.formatting import display_units, number as format_number, text_symbol as symbol, typeset
 from paraflex.plots.catalogue import CATALOGUE
 from paraflex.report import Page, animation, motion_page, render, save_page, tracking_page, verification_page
+from paraflex.report.designs import PARALLEL, DesignChart
 from paraflex.report.film import MOST_FRAMES, frames_of
 from paraflex.report.packing import Series, packed
 from paraflex.report.page import plotly_script
@@ -114,7 +118,8 @@ def test_arrays_come_back_within_half_a_step_with_their_gaps():
     values = np.cumsum(rng.normal(size=(2, 60, 5, 2)), axis=1) + [3.0, -40.0]
     values[1, 30:] = np.nan
     smooth = np.sin(np.linspace(0.0, 3.0, 60))[:, None, None] * values[:, :1]
-    assert [packed(one)["order"] for one in (values, smooth)] == [1, 2]
+    along = np.linspace(0.0, 1.0, 5)[:, None] * values[:, :, :1]
+    assert [packed(one)["orders"] for one in (values, smooth, along)] == [(1, 0), (3, 1), (1, 2)]
     np.testing.assert_allclose(array_of(packed(smooth)), smooth, rtol=0, atol=0.51 * np.ptp(smooth) / 65534)
     back = array_of(packed(values))
     assert np.array_equal(np.isnan(back), np.isnan(values))
@@ -235,11 +240,28 @@ def test_nothing_is_loaded_from_anywhere(tracking_html):
     assert re.search(r"url\(|fetch\(|XMLHttpRequest|import\(", tracking_html) is None
 
 
-def test_plotly_is_whole_and_does_not_end_its_script():
-    assert len(plotly_script()) > 3_000_000
-    assert "</script" not in plotly_script()
-    whole = render(Page("a", "test"))
-    assert plotly_script() in whole
+def test_plotly_comes_compressed_and_whole_only_where_its_basic_part_does_not_do():
+    basic, whole = (zlib.decompress(base64.b64decode(plotly_script(whole=each))).decode() for each in (False, True))
+    assert basic.startswith("/**\n* plotly.js (basic - minified) v")
+    assert "parcoords" in whole
+    assert all("MIT license" in script[:300] for script in (basic, whole))
+    assert len(plotly_script(whole=False)) < 600_000 < len(plotly_script(whole=True)) < 2_200_000
+    designs = Panel("All designs", [DesignChart(PARALLEL, "All", Axis("y"), x=Axis("x"), drawer=PARALLEL)])
+    for survey in ((), (designs,)):
+        assert plotly_script(whole=bool(survey)) in render(Page("a", "test", survey=survey))
+
+
+def test_a_report_of_three_short_runs_takes_less_than_a_megabyte():
+    assert len(render(tracking_page(tracked()))) < 1_000_000
+
+
+def test_shapes_of_bent_beams_take_less_than_half_a_byte_for_each_number():
+    along, time = np.linspace(0.0, 1.0, 17), np.linspace(0.0, 1.0, 200)
+    shape = np.sin(7.0 * time)[:, None] * along**2 * (3.0 - along)
+    values = np.stack([np.broadcast_to(along, shape.shape), 1e-3 * shape], axis=-1)[None]
+    kept = packed(values)
+    assert len(kept["data"]) < 0.5 * values.size
+    np.testing.assert_allclose(array_of(kept), values, rtol=0, atol=0.51 / 65534)
 
 
 def test_names_cannot_break_out_of_the_page():
@@ -360,8 +382,9 @@ def test_a_page_appears_whole_or_not_at_all(tmp_path):
 def test_without_plotly_it_is_said(monkeypatch):
     monkeypatch.setattr("paraflex.report.page.find_spec", lambda name: None)
     plotly_script.cache_clear()
+    assert "report-data" in render(Page("a", "test"))
     with pytest.raises(InputError, match="plotly: not installed"):
-        render(Page("a", "test"))
+        plotly_script(whole=True)
     monkeypatch.undo()
     plotly_script.cache_clear()
 

@@ -12,6 +12,8 @@ from paraflex.figures.designs import DesignTable, in_conflict
 from paraflex.formatting import count, superscripts
 from .packing import Series
 
+# Kind of chart that Plotly's basic part does not have.
+PARALLEL = "parallel"
 LOWER = (
     "Less is taken as better; metrics for which more may be better, as safety factor and stiffness, select no design."
 )
@@ -133,7 +135,7 @@ def survey(designs: Designs, first: Sequence[Chart] = (), *, seeks_least: bool =
     if metrics:
         charts.append(_chart("distribution", "Distribution", [Picker("of", metrics)]))
         charts.append(_chart(
-            "parallel", "All numbers of each run", [Picker("coloured by", metrics)],
+            PARALLEL, "All numbers of each run", [Picker("coloured by", metrics)],
             "One line per run. Drag along an axis to keep the runs that pass there; drag names to reorder.",
         ))  # fmt: skip
     return [Panel(_heading(designs), charts)] if charts else []

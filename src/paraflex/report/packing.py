@@ -3,6 +3,7 @@
 import base64
 import zlib
 from dataclasses import dataclass, field
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -13,6 +14,8 @@ from paraflex.arrays import ArrayLike, NDArray
 MISSING, _LARGEST_CODE = -32768, 32767
 # Bits of a single-precision fraction that are dropped: the rest resolves 4e-6 of a value and compresses better.
 _DROPPED = 6
+# Highest order of differences over frames, and over points; and half the number of frames that decide.
+_HIGHEST, _FEW = 3, 16
 
 
 @dataclass
@@ -48,11 +51,12 @@ class Series:
 
 
 def packed(values: ArrayLike) -> dict[str, Any]:
-    """Return an array (runs, frames, ...) with last axis x, y for JSON: 16 bits per number, differences over frames.
+    """Return an array (runs, frames, ...) with last axis x, y for JSON: 16 bits per number, as differences.
 
     A number is `offset + scale * integer`, with separate offsets for x and y; it is NaN where the integer is MISSING.
-    Differences are of the first order, or of the second, which are smaller for smooth motions. Their sign is the lowest
-    bit, so that the higher bytes of small ones are zero.
+    Differences are over frames, and then over points (runs, frames, points, 2), each of the order from none to the
+    third with which numbers are smallest: motions are smooth, and beams have smooth shapes. The sign of a difference is
+    its lowest bit, so that the higher bytes of small ones are zero.
     """
     array = np.asarray(values, dtype=float)
     flat = array.reshape(-1, array.shape[-1])
@@ -63,13 +67,26 @@ def packed(values: ArrayLike) -> dict[str, Any]:
     whole = np.full(array.shape, MISSING, dtype="<i2")
     known = np.isfinite(array).all(axis=-1)
     whole[known] = np.rint((array[known] - offset) / scale)
-    # Integer overflow of the differences cancels in the sums.
-    first = np.diff(whole, axis=1, prepend=np.int16(0))
-    second = np.diff(first, axis=1, prepend=np.int16(0))
-    order = 1 + bool(_bits(second) < _bits(first))
-    signed = (first, second)[order - 1]
+    # A few frames in the middle show which orders suit.
+    middle = array.shape[1] // 2
+    few = whole[:, max(0, middle - _FEW) : middle + _FEW]
+    orders = min(_orders(array.ndim), key=lambda each: _bits(_differences(few, each)))
+    signed = _differences(whole, orders)
     data = _deflated(((signed << 1) ^ (signed >> 15)).astype("<i2").view(np.uint8).reshape(-1, 2))
-    return {"shape": list(array.shape), "offset": offset.tolist(), "scale": scale, "order": order, "data": data}
+    return {"shape": list(array.shape), "offset": offset.tolist(), "scale": scale, "orders": orders, "data": data}
+
+
+def _orders(ndim: int) -> list[tuple[int, int]]:
+    """Return the possible orders of differences over frames and over points."""
+    return list(product(range(_HIGHEST + 1), range(_HIGHEST + 1) if ndim > 3 else [0]))
+
+
+def _differences(whole: NDArray[np.int16], orders: tuple[int, int]) -> NDArray[np.int16]:
+    """Return differences over frames and over points; overflow of integers cancels in the sums."""
+    for axis, order in enumerate(orders, start=1):
+        for _ in range(order):
+            whole = np.diff(whole, axis=axis, prepend=np.int16(0))
+    return whole
 
 
 def _bits(whole: NDArray[np.int16]) -> float:
@@ -79,4 +96,9 @@ def _bits(whole: NDArray[np.int16]) -> float:
 
 def _deflated(numbers: NDArray[np.uint8]) -> str:
     """Compress bytes (numbers, bytes of each) to base64: all first bytes, then all second ones, which is smaller."""
-    return base64.b64encode(zlib.compress(np.ascontiguousarray(numbers.T).tobytes(), 6)).decode("ascii")
+    return deflated(np.ascontiguousarray(numbers.T).tobytes())
+
+
+def deflated(data: bytes) -> str:
+    """Compress bytes to base64."""
+    return base64.b64encode(zlib.compress(data, 6)).decode("ascii")

@@ -34,9 +34,9 @@ from paraflex.formatting import logarithmic_number, shortened, typeset
 from paraflex.plots.themes import THEMES
 from paraflex.units import DisplayUnit
 from paraflex.writing import write_text
-from .designs import Designs
+from .designs import PARALLEL, Designs
 from .film import Animation
-from .packing import Series
+from .packing import Series, deflated
 from .text import pairs
 
 # Number of notices from which they are folded.
@@ -141,7 +141,7 @@ def render(page: Page) -> str:
         style="\n".join(map(_asset, _STYLES)),
         data=_script_json(_data(page)),
         scripts="\n".join(map(_asset, _SCRIPTS)),
-        plotly=plotly_script(),
+        plotly=plotly_script(whole=_needs_whole(page)),
     )
 
 
@@ -160,17 +160,26 @@ def save_page(page: Page, path: str | Path) -> None:
 
 
 @cache
-def plotly_script() -> str:
-    """Return Plotly's script from its Python package without importing the package, which would take a second."""
+def plotly_script(*, whole: bool) -> str:
+    """Return Plotly's script, compressed: its basic part, or the whole, which its Python package has.
+
+    The package itself, whose import takes a second, is not imported.
+    """
+    if not whole:
+        return deflated(_asset("plotly-basic.min.js").encode())
     found = find_spec("plotly")
     for folder in (found.submodule_search_locations or []) if found else []:
         script = Path(folder) / "package_data" / "plotly.min.js"
         if script.is_file():
-            # A closing tag in one of its strings would end the page's script.
-            return script.read_text(encoding="utf-8").replace("</script", "<\\/script")
+            return deflated(script.read_bytes())
     raise InputError(
         "not installed, or without its script", field="plotly", remedy="pip install --force-reinstall plotly"
     )
+
+
+def _needs_whole(page: Page) -> bool:
+    """Return whether a page has charts beyond lines, marks and bars: parallel coordinates."""
+    return any(getattr(chart, "drawer", "") == PARALLEL for panel in page.survey for chart in panel.charts)
 
 
 def _data(page: Page) -> dict[str, Any]:

@@ -9,7 +9,8 @@ const report = (() => {
   let rows = [];
 
   async function inflated(text) {
-    const packed = Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0));
+    const letters = atob(text), packed = new Uint8Array(letters.length);
+    for (let k = 0; k < packed.length; k++) packed[k] = letters.charCodeAt(k);
     const stream = new Blob([packed]).stream().pipeThrough(new DecompressionStream("deflate"));
     return new Uint8Array(await new Response(stream).arrayBuffer());
   }
@@ -36,21 +37,28 @@ const report = (() => {
   }
 
   // An array (runs, frames, ...) with x, y last, in metres; NaN where there is nothing. It is stored as differences over
-  // frames, of first or second order, with the sign in the lowest bit.
+  // frames and then over points, each of some order, with the sign in the lowest bit.
   async function unpacked(array) {
     const { buffer } = gathered(await inflated(array.data), 2);
     const whole = new Int16Array(buffer);
-    const [runs, frames] = array.shape;
+    const [runs, frames] = array.shape, [overFrames, overPoints] = array.orders;
     const wide = whole.length / (runs * frames) || 0;
     const values = new Float32Array(whole.length);
     for (let k = 0; k < whole.length; k++) whole[k] = ((whole[k] & 0xffff) >>> 1) ^ -(whole[k] & 1);
-    for (let order = 0; order < array.order; order++) {
+    for (let order = 0; order < overPoints; order++) {
+      for (let from = 0; from < whole.length; from += wide) {
+        for (let k = from + 2; k < from + wide; k++) whole[k] += whole[k - 2];
+      }
+    }
+    for (let order = 0; order < overFrames; order++) {
       for (let run = 0; run < runs; run++) {
         for (let k = (run * frames + 1) * wide; k < (run + 1) * frames * wide; k++) whole[k] += whole[k - wide];
       }
     }
-    for (let k = 0; k < whole.length; k++) {
-      values[k] = whole[k] === -32768 ? NaN : array.offset[k % 2] + array.scale * whole[k];
+    const { offset: [x, y], scale } = array;
+    for (let k = 0; k < whole.length; k += 2) {
+      values[k] = whole[k] === -32768 ? NaN : x + scale * whole[k];
+      values[k + 1] = whole[k + 1] === -32768 ? NaN : y + scale * whole[k + 1];
     }
     return { values, runs, frames, wide };
   }
@@ -96,7 +104,7 @@ const report = (() => {
   };
 
   return {
-    page, state, set, setTheme, isDark, colour, palette, readSeries, unpacked, between, element,
+    page, state, set, setTheme, isDark, colour, palette, inflated, readSeries, unpacked, between, element,
     row: (number) => rows[number],
     on: (what, listener) => listeners[what].push(listener),
     runName: () => page.runs[state.run] || "",

@@ -129,9 +129,9 @@ const begin = (() => {
     }
   }
 
-  function loadPlotly() {
+  async function loadPlotly(bytes) {
     const script = element("script");
-    script.textContent = byId("plotly").textContent;
+    script.textContent = new TextDecoder().decode(await bytes);
     document.head.append(script);
   }
 
@@ -147,13 +147,16 @@ const begin = (() => {
     showRun();
     designs.start();
     charts.start();
+    const charted = page.panels.length || page.survey.length;
+    // Inflated beside what the animation reads.
+    const plotly = charted && report.inflated(byId("plotly").textContent);
     await player.start();
     document.documentElement.dataset.ready = "true";
     performance.mark("ready");
-    if (!page.panels.length && !page.survey.length) return;
+    if (!charted) return;
     // After the screen shows what there is.
     await new Promise((done) => requestAnimationFrame(() => setTimeout(done, 0)));
-    loadPlotly();
+    await loadPlotly(plotly);
     await charts.refresh();
     document.documentElement.dataset.charts = "true";
     performance.mark("charts");
