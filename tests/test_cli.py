@@ -7,6 +7,7 @@ import pytest
 
 from paraflex.files import library_file
 from paraflex.results import load_results
+from paraflex.studies.tracking import StudyResult
 from shell import interrupted, paraflex
 
 FAST = ["--tol", "1e-3", "--duration", "0.1", "--samples", "51"]
@@ -75,6 +76,15 @@ def test_results_agree_with_the_summary(results):
     final = data["end_effector"].sel(mode="++++").isel(time=-1)
     assert list(final.values) == summary["modes"]["++++"]["end_effector_final"]
     assert json.loads(data.attrs["parameters"])["model"]["name"] == "RAParM-I"
+
+
+def test_runs_are_summarised_once(tmp_path, monkeypatch):
+    made, make = [], StudyResult.to_dict
+    monkeypatch.setattr(StudyResult, "to_dict", lambda result: made.append(make(result)) or made[-1])
+    done = paraflex("run", "--no-figures", "--no-report", "--mode", "++++", *FAST, "--out", str(tmp_path))
+    assert done.returncode == 0, done.stderr
+    assert len(made) == 1
+    assert json.loads((tmp_path / "summary.json").read_text()).items() >= json.loads(json.dumps(made[0])).items()
 
 
 def test_second_run_gives_the_same_numbers(results, tmp_path):

@@ -5,6 +5,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import partial
+from typing import Any
 
 from rich.progress import TimeElapsedColumn
 
@@ -107,19 +108,23 @@ def _run(request: RunRequest, model: Model, planned: Sequence[_Along], fidelity:
 
     If a later path fails, the results of earlier ones are kept and printed.
     """
-    console, alone, done, places = PlainConsole(stderr=True), len(planned) == 1, {}, []
+    console, alone, places = PlainConsole(stderr=True), len(planned) == 1, []
+    # Results by path, and the same as plain values, which take a while to make.
+    done: dict[str, StudyResult] = {}
+    numbers: dict[str, dict[str, Any]] = {}
 
     def show(out: PlainConsole) -> None:
-        results = {"" if alone else path: result for path, result in done.items()}
-        print_runs(out, results, planned[0].study.task, fidelity)
+        results, plain = ({"" if alone else path: one for path, one in each.items()} for each in (done, numbers))
+        print_runs(out, results, plain, planned[0].study.task, fidelity)
 
     try:
         for along in planned:
             with apart():
-                done[along.path] = result = _simulated(console, model, along)
+                result, numbers[along.path] = _simulated(console, model, along)
+                done[along.path] = result
                 if result.data is not None:
                     if alone:
-                        print_results(result.to_dict(), show, as_json=request.json)
+                        print_results(numbers[along.path], show, as_json=request.json)
                     else:
                         warn_of(PlainConsole(stderr=request.json), verdict_of(result.data), along.whose)
                     places.append(_draw(console, request, along, result, began))
@@ -128,16 +133,18 @@ def _run(request: RunRequest, model: Model, planned: Sequence[_Along], fidelity:
             began = time.perf_counter()
     finally:
         if done and not alone:
-            numbers = {"paths": {path: result.to_dict() for path, result in done.items()}}
-            print_results(numbers, show, as_json=request.json, findings=())
+            print_results({"paths": numbers}, show, as_json=request.json, findings=())
         if not request.json:
             console.print_lines(*places)
     well = len(done) == len(planned) and all(result.complete for result in done.values())
     return exit_code(well, interrupted=any(result.interrupted for result in done.values()))
 
 
-def _simulated(console: PlainConsole, model: Model, along: _Along) -> StudyResult:
-    """Run all modes along a path and write their results; nothing is written if no mode could start."""
+def _simulated(console: PlainConsole, model: Model, along: _Along) -> tuple[StudyResult, dict[str, Any]]:
+    """Run all modes along a path and write their results, returned also as plain values.
+
+    Nothing is written if no mode could start.
+    """
     try:
         with _progress(console, along) as report:
             result = along.study.run(on_progress=report)
@@ -147,10 +154,11 @@ def _simulated(console: PlainConsole, model: Model, along: _Along) -> StudyResul
     if result.data is None:
         warn_of(console, collected(along.study.findings), along.whose)
         failures(console, result, along.whose)
-        return result
+        return result, result.to_dict()
     keep_findings(result.data, collected(verdict_of(result.data)))
-    write_numbers(result.data, result.to_dict(), along.folder)
-    return result
+    numbers = result.to_dict()
+    write_numbers(result.data, numbers, along.folder)
+    return result, numbers
 
 
 def _draw(console: PlainConsole, request: RunRequest, along: _Along, result: StudyResult, began: float) -> str:

@@ -16,7 +16,13 @@ from paraflex.tracking import TrackingTask
 from .tables import PlainConsole, print_table
 
 
-def print_runs(out: PlainConsole, results: Mapping[str, StudyResult], task: TrackingTask, model: str) -> None:
+def print_runs(
+    out: PlainConsole,
+    results: Mapping[str, StudyResult],
+    numbers: Mapping[str, dict[str, Any]],
+    task: TrackingTask,
+    model: str,
+) -> None:
     """Print tables of the runs in every mode along each path, and lines on all of them; nothing if none has results.
 
     Parameters
@@ -25,6 +31,8 @@ def print_runs(out: PlainConsole, results: Mapping[str, StudyResult], task: Trac
         Console to print to.
     results : mapping of str to StudyResult
         Results by path; the name of a single path may be empty.
+    numbers : mapping of str to dict
+        The same results as plain values.
     task : TrackingTask
         Task of any of the paths.
     model : str
@@ -33,12 +41,12 @@ def print_runs(out: PlainConsole, results: Mapping[str, StudyResult], task: Trac
     data = {path: result.data for path, result in results.items() if result.data is not None}
     if not data:
         return
-    summaries = {path: results[path].to_dict() for path in data}
+    summaries = {path: numbers[path] for path in data}
     # Numbers of each run by the names of its path, if not empty, and of its mode.
     runs = {
-        (path, mode) if path else (mode,): numbers
+        (path, mode) if path else (mode,): one
         for path, summary in summaries.items()
-        for mode, numbers in summary["modes"].items()
+        for mode, one in summary["modes"].items()
     }
     heads, first = ["path", "mode"] if any(data) else ["mode"], next(iter(summaries.values()))
     rows = Runs(data, {path: list(results[path].failed) for path in data})
@@ -48,14 +56,14 @@ def print_runs(out: PlainConsole, results: Mapping[str, StudyResult], task: Trac
     motors = "held all the time" if ked else "held by brakes" if task.holds else "free"
     print_table(out, after_table(rows), f"Tracking error during the motion and after it, the motors {motors}")
     print_table(out, controller_table(runs, heads))
-    for (*path, mode), numbers in runs.items():
-        if numbers["status"] == "stopped":
-            whose = "".join(f'path "{one}", ' for one in path)
-            out.print_lines(f'{whose}mode "{mode}": {numbers["message"]}')
+    for (*path, mode), one in runs.items():
+        if one["status"] == "stopped":
+            whose = "".join(f'path "{each}", ' for each in path)
+            out.print_lines(f'{whose}mode "{mode}": {one["message"]}')
     sizes = [reduced_words(one["reduction"]) for one in runs.values() if one.get("reduction") is not None]
     reduced = reduced_runs_table(heads, runs.items(), HEADLINE[ErrorSpan(first["error"])])
     print_table(out, reduced, "".join(sizes[:1]))
-    modes = {", path ".join(reversed(names)): numbers for names, numbers in runs.items()}
+    modes = {", path ".join(reversed(names)): one for names, one in runs.items()}
     below_tolerance(out, summaries, modes)
     out.print_lines(validity_line({name: mode.get("validity") for name, mode in modes.items()}))
     if len(results) > 1:

@@ -11,7 +11,7 @@ from paraflex.arrays import Array
 from paraflex.errors import InputError
 from paraflex.formatting import peak, text_symbol
 from .charts import DOTTED, Axis, Chart, Curve, Look, Span, look
-from .selection import names_of, samples
+from .selection import moving, names_of, samples_of
 
 MOST_SAMPLES = 2000
 # Share of its median above which a curve that begins at zero is drawn on a logarithmic axis.
@@ -28,7 +28,7 @@ def run_names(data: xr.Dataset) -> list[str]:
 
 def stopped_runs(data: xr.Dataset) -> list[bool]:
     """Return whether each run (mode, time, ...) ended before the last sample."""
-    return [0 < samples(data.isel(mode=r)) < data.sizes["time"] for r in range(data.sizes["mode"])]
+    return [0 < samples_of(each) < data.sizes["time"] for each in moving(data).transpose("mode", "time", ...).values]
 
 
 def after_motion(data: xr.Dataset) -> list[Span]:

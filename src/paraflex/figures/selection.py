@@ -5,6 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 import xarray as xr
 
+from paraflex.arrays import Array
 from paraflex.errors import InputError
 from paraflex.formatting import is_signs
 
@@ -96,8 +97,17 @@ def of_point(run: xr.Dataset, point: str | None) -> xr.Dataset:
 
 def samples(run: xr.Dataset) -> int:
     """Return the number of samples that a run reached."""
-    moving = run["end_effector"] if "end_effector" in run else run["angle"]
-    missing = ~np.isfinite(moving.values).all(axis=-1)
+    return samples_of(moving(run).values)
+
+
+def moving(data: xr.Dataset) -> xr.DataArray:
+    """Return what moves in all runs: the end-effector, or the bodies of a mechanism without one."""
+    return data["end_effector"] if "end_effector" in data else data["angle"]
+
+
+def samples_of(values: Array) -> int:
+    """Return the number of samples before the first one of values (samples, parts) that is missing."""
+    missing = ~np.isfinite(values).all(axis=-1)
     return int(np.argmax(missing)) if missing.any() else missing.size
 
 

@@ -15,6 +15,8 @@ from .numbers import finite_or_none, largest, units_of_each
 Figures = dict[str, float | str | None]
 # Variables of beams, and the keys that differ from their names.
 OF_BEAMS = ("stress_max", "stress_place", "stress_time", "bending_stress_max", "axial_stress_max", "safety_factor")
+# Variables of joints; those of vectors may have an error.
+_OF_JOINTS = ("joint_coordinate", "joint_speed", "joint_force", "joint_moment")
 _NAMES = {"stress_place": "place", "stress_time": "time"}
 
 
@@ -47,8 +49,10 @@ def load_figures(run: xr.Dataset) -> dict[str, Any]:
             if body in bent or np.isfinite(run["stress_max"].values[b])
         }
     if "joint_coordinate" in run:
+        # Selecting one joint of all variables would take most of the time.
+        few = run[[name for name in run.data_vars if str(name).removesuffix("_error") in _OF_JOINTS]]
         out["joints"] = {
-            str(joint): _joint(run.sel(joint=joint), slides=slides)
+            str(joint): _joint(few.sel(joint=joint), slides=slides)
             for joint, slides in zip(run["joint"].values, sliding_joints(run), strict=True)
         }
     for group, dim, torque in (
