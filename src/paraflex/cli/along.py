@@ -114,7 +114,8 @@ def _run(request: RunRequest, model: Model, planned: Sequence[_Along], fidelity:
     numbers: dict[str, dict[str, Any]] = {}
 
     def show(out: PlainConsole) -> None:
-        results, plain = ({"" if alone else path: one for path, one in each.items()} for each in (done, numbers))
+        results = {"" if alone else path: result for path, result in done.items()}
+        plain = {"" if alone else path: one for path, one in numbers.items()}
         print_runs(out, results, plain, planned[0].study.task, fidelity)
 
     try:

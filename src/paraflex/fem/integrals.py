@@ -212,7 +212,7 @@ def bar_integrals(
     # s0 = [x, 0] and E^T = [[0, 1], [-1, 0]].
     return ShapeIntegrals(
         m=masses.sum(), S1=np.array([first.sum(), 0.0]), S2=np.array([masses @ along, masses @ across]),
-        I0=first @ x, I1=first @ along, I2=(masses * along.T) @ along + (masses * across.T) @ across,
+        I0=(first * x).sum(), I1=first @ along, I2=(masses * along.T) @ along + (masses * across.T) @ across,
         G1=first @ across, G2=coupled - coupled.T, J=inertias.sum(), Jf=inertias @ slopes,
         Jff=(inertias * slopes.T) @ slopes, K=stiffness, D=basis,
     )  # fmt: skip
