@@ -6,6 +6,9 @@ BIN := $(VENV)/bin
 PIP := $(BIN)/python -m pip install --quiet --constraint constraints.txt --build-constraint constraints.txt
 KERNELS := $(wildcard src/paraflex/kernel/*.py)
 
+# Images often set it: every process would compile all of the package anew.
+unexport PYTHONDONTWRITEBYTECODE
+
 .PHONY: run test lint types imports tests coverage docs clean
 
 run: $(VENV)/.run
