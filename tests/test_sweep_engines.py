@@ -7,13 +7,15 @@ import sys
 import time
 import urllib.error
 import urllib.request
+from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
+from multiprocessing import get_context
 
 import pandas as pd
 import psutil
 import pytest
 
 from journals import rows_in
-from paraflex.campaign import LostCluster, Workers, open_engine
+from paraflex.campaign import LostCluster, Workers, open_engine, outcomes
 from paraflex.designs.run import Outcome, run_task
 from paraflex.errors import InputError
 from paraflex.studies import load_sweep, sweep
@@ -207,3 +209,54 @@ def test_ctrl_c_keeps_what_is_done_and_says_how_to_go_on(study, tmp_path):
     assert "the same command continues from there" in done.stderr
     assert "Traceback" not in done.stderr
     assert 0 < len(pd.read_parquet(out / "unfinished.parquet")) < 8192
+
+
+# --- Executors, and parts in processes of their own ----------------------------------------------------------------
+
+
+def test_an_executor_of_ones_own_gives_the_same_table_and_lives_on(study, table, tmp_path):
+    with ThreadPoolExecutor(2) as executor:
+        found = sweep(study, tmp_path / "out", workers=Workers(executor))
+        assert found.table.read_bytes() == table
+        assert executor.submit(pow, 2, 3).result() == 8
+    with pytest.raises(RuntimeError, match="after shutdown"):
+        sweep(study, tmp_path / "shut", workers=Workers(executor))
+
+
+def test_processes_of_an_executor_that_broke_are_named(study, tmp_path):
+    with ProcessPoolExecutor(1, mp_context=get_context("spawn")) as executor:
+        engine = open_engine(executor)
+        assert engine.workers == 1
+        with pytest.raises(LostCluster, match="executor no longer takes calls"):
+            list(outcomes(engine, os._exit, [1]))
+
+
+def test_shards_are_joined_to_the_same_table(study, table, tmp_path):
+    folder, parts = tmp_path / "out", 4
+    first = sweep(study, folder, shard="1/4")
+    assert (first.folder, first.total, first.complete) == (folder / "shard-1-of-4", 4, True)
+    # One is left unfinished, one is not begun: what is missing is run when they are joined.
+    sweep(study, folder, shard=f"2/{parts}", limit=2)
+    third = sweep(study, folder, shard="3/4")
+    assert third.fresh == third.total == 2
+    joined = sweep(study, folder)
+    assert joined.table.read_bytes() == table
+    assert joined.fresh == 12 - 4 - 2 - 2
+    # More parts than tasks: some have nothing to do.
+    assert sweep(study, tmp_path / "more", shard="8/8").complete
+
+
+@pytest.mark.parametrize("shard", ["0/4", "5/4", "1", "1/0", "-1/4", "1/4/4", "", "one/two"])
+def test_shards_that_are_none_are_refused(study, tmp_path, shard):
+    with pytest.raises(InputError, match="--shard: not a part of a study"):
+        sweep(study, tmp_path / "out", shard=shard)
+    assert not (tmp_path / "out").exists()
+
+
+def test_rows_of_another_study_in_a_shard_are_left_out(study, table, tmp_path):
+    other = tmp_path / "other.toml"
+    other.write_text(STUDY.replace("seed = 5", "seed = 6"), encoding="utf-8")
+    sweep(load_sweep(other), tmp_path / "out", shard="1/2")
+    joined = sweep(study, tmp_path / "out")
+    assert joined.fresh == joined.total
+    assert joined.table.read_bytes() == table

@@ -6,6 +6,7 @@ import json
 import shutil
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Mapping
+from concurrent.futures import Executor
 from contextlib import contextmanager, nullcontext, suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -21,9 +22,20 @@ from paraflex.folders.changes import check_inside
 from paraflex.results.storage import write_results
 from paraflex.results.tables import read_parquet
 from paraflex.seals import damaged
-from paraflex.writing import GO_ON, read_values, write_json
+from paraflex.writing import GO_ON, read_values, whole_file, write_json
 from .journal import JOURNAL, Journal, Row, write_journal
-from .tables import CSV, EARLIER, RESULTS, SCHEMA_KEY, UNFINISHED, read_data, table_name, write_table
+from .tables import (
+    CSV,
+    EARLIER,
+    RESULTS,
+    SCHEMA_KEY,
+    UNFINISHED,
+    read_data,
+    read_table,
+    table_name,
+    tables_of,
+    write_table,
+)
 from .workers import THREADS, Engine, open_engine
 
 if TYPE_CHECKING:
@@ -31,6 +43,8 @@ if TYPE_CHECKING:
 
 STUDY = "study.json"
 TRAJECTORIES = "trajectories"
+# Folders of the parts of a study that separate processes compute.
+SHARDS = "shard-*-of-*"
 
 
 @dataclass(frozen=True)
@@ -114,6 +128,7 @@ def open_campaign(
             if not (folder / STUDY).exists():
                 with held.added_files() as new:
                     write_json(new / STUDY, study, remedy=GO_ON)
+            _join_shards(folder, journal, belongs)
             yield Campaign(held, journal)
 
 
@@ -176,6 +191,24 @@ def _take_over(folder: Path, journal: Journal, schema: pa.Schema, belongs: Calla
     shutil.rmtree(folder / Path(EARLIER).parent, ignore_errors=True)
 
 
+def _join_shards(folder: Path, journal: Journal, belongs: Callable[[Row], bool]) -> None:
+    """Add the rows and trajectories of the shards in a folder that it does not have yet."""
+    shards = sorted(folder.glob(SHARDS))
+    known = set(journal.runs()) if shards else set()
+    for shard in shards:
+        for file in sorted(shard.glob(f"{TRAJECTORIES}/*.nc")):
+            own = f"{TRAJECTORIES}/{file.name}"
+            check_inside(folder, own)
+            if not (folder / own).exists():
+                with whole_file(folder / own, remedy=GO_ON) as new:
+                    shutil.copyfile(file, new)
+        rows = [row for file in tables_of(shard) for row in read_table(file).to_pylist()]
+        new = [row for row in rows if row["run"] not in known and belongs(row)]
+        journal.add(new)
+        known.update(row["run"] for row in new)
+    journal.commit()
+
+
 def _typed(file: Path, schema: pa.Schema) -> pa.Table:
     """Read a table, and check that its columns have the types of the study's columns."""
     found = read_parquet(file)
@@ -232,15 +265,16 @@ class Workers(CheckedFields):
 
     Attributes
     ----------
-    engine : str or Engine
-        Kind of workers: "threads" of this process, "processes", or "dask"; or an engine.
+    engine : str, Engine or concurrent.futures.Executor
+        Kind of workers: "threads" of this process, "processes", or "dask"; or an engine; or an executor, which is not
+        shut down, for example that of mpi4py or of a batch system.
     number : int or None
-        Number of workers; None for the number of processors.
+        Number of workers; None for the number of processors, or that of the executor.
     cluster : str or None
         Address of a Dask scheduler; None for a cluster on this machine.
     """
 
-    engine: str | Engine = THREADS
+    engine: str | Engine | Executor = THREADS
     number: int | None = None
     cluster: str | None = None
 

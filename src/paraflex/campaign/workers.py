@@ -11,7 +11,7 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Iterable, Iterator
-from concurrent.futures import BrokenExecutor, CancelledError, Future, ProcessPoolExecutor, ThreadPoolExecutor
+from concurrent.futures import BrokenExecutor, CancelledError, Executor, Future, ProcessPoolExecutor, ThreadPoolExecutor
 from contextlib import suppress
 from importlib import import_module
 from itertools import islice
@@ -233,6 +233,32 @@ class Dask(Engine):
             self._cluster.close(timeout=5)
 
 
+class Given(Engine):
+    """Executor of the user, which is not shut down; calls that have not begun are cancelled at the end."""
+
+    def __init__(self, executor: Executor, workers: int) -> None:
+        super().__init__(workers)
+        self._pool, self._calls = executor, set[Future[Any]]()
+
+    def submit(self, function: Callable[..., Any], *arguments: Any) -> Future[Any]:
+        """Submit a function call; see `Engine`."""
+        call = super().submit(function, *arguments)
+        self._calls.add(call)
+        call.add_done_callback(self._calls.discard)
+        return call
+
+    def restart(self) -> None:
+        """Raise `LostCluster`: an executor that is broken cannot be restarted here."""
+        raise LostCluster(
+            "the executor no longer takes calls; run the study again with a new one: it goes on from there"
+        )
+
+    def close(self, *, abandon: bool = False) -> None:
+        """Cancel the calls that have not begun."""
+        for call in list(self._calls):
+            call.cancel()
+
+
 def _reach(address: str) -> None:
     """Check that a scheduler can be reached; a client that cannot connect closes slowly and logs errors."""
     import asyncio
@@ -247,15 +273,15 @@ def _reach(address: str) -> None:
     asyncio.run(reach())
 
 
-def open_engine(engine: str | Engine, workers: int | None = None, cluster: str | None = None) -> Engine:
+def open_engine(engine: str | Engine | Executor, workers: int | None = None, cluster: str | None = None) -> Engine:
     """Start an engine by name.
 
     Parameters
     ----------
-    engine : str or Engine
-        Name of the engine: "threads", "processes" or "dask". An Engine is returned unchanged.
+    engine : str, Engine or Executor
+        Name of the engine: "threads", "processes" or "dask"; or an executor. An Engine is returned unchanged.
     workers : int, optional
-        Number of workers; by default the number of processors available to this process.
+        Number of workers; by default the executor's, or the number of processors available to this process.
     cluster : str, optional
         Address of a Dask scheduler, "tcp://host:8786"; by default a cluster is started on this machine.
 
@@ -267,7 +293,7 @@ def open_engine(engine: str | Engine, workers: int | None = None, cluster: str |
     """
     if isinstance(engine, Engine):
         return engine
-    if engine not in WORKER_ENGINES:
+    if not isinstance(engine, Executor) and engine not in WORKER_ENGINES:
         raise InputError("unknown engine", field="--engine", value=engine, remedy=suggestion(engine, WORKER_ENGINES))
     if cluster is not None and engine != DASK:
         remedy = "write --engine dask, or leave it out"
@@ -279,7 +305,9 @@ def open_engine(engine: str | Engine, workers: int | None = None, cluster: str |
         raise InputError("must be positive", field="--workers", value=workers, remedy="give 2")
     # Count the processors that this process may use, because batch systems assign only a part of the machine.
     own = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
-    count = workers or own or 1
+    count = workers or getattr(engine, "_max_workers", None) or own or 1
+    if isinstance(engine, Executor):
+        return Given(engine, count)
     if engine == THREADS:
         return Threads(count)
     return Processes(count) if engine == PROCESSES else Dask(count, cluster)

@@ -1,7 +1,6 @@
 """`paraflex sweep` and `paraflex indices`: thousands of runs with varied numbers, continued when called again."""
 
 import time
-from pathlib import Path
 from typing import Any
 
 from paraflex.campaign import Progress
@@ -22,9 +21,8 @@ def sweep_command(request: SweepRequest) -> int:
     """Run or continue a sweep; return the exit code."""
     console = PlainConsole(stderr=True)
     study = load_sweep(request.study)
-    folder = request.folder
     compile_kernels_for(study.model().mechanism, console.print)
-    result = _sweep(console, study, folder, request)
+    result = _sweep(console, study, request)
     verdict = study.setting.verdict()
     # In the printed output, findings of the verdict report which parts of paths are run.
     parts = {path: part.to_dict() for path, part in study.setting.parts().items()} if request.json else {}
@@ -33,32 +31,35 @@ def sweep_command(request: SweepRequest) -> int:
     session = {"fresh": result.fresh, "seconds": result.seconds, "interrupted": result.interrupted}
     more = session | {"part": parts, "verdict": verdict.to_dict()}
     print_results(figures | more, lambda out: _report(out, console, result), as_json=request.json, findings=verdict)
-    if request.report and result.done:
-        _write_report(console, folder, result)
+    if request.shard is not None:
+        console.print_lines(f"paraflex sweep {request.study} --output {request.folder} joins all parts")
+    elif request.report and result.done:
+        _write_report(console, result)
     return exit_code(not result.done or bool(result.counts.get("complete")), interrupted=result.interrupted)
 
 
-def _sweep(console: PlainConsole, study: SweepStudy, folder: Path, request: SweepRequest) -> SweepResult:
+def _sweep(console: PlainConsole, study: SweepStudy, request: SweepRequest) -> SweepResult:
     with bars(console, "{task.completed}/{task.total} runs", "{task.fields[pace]}") as progress:
-        bar = progress.add_task(study.name, total=study.runs, pace="", start=False)
+        bar = progress.add_task(study.name, total=None if request.shard else study.runs, pace="", start=False)
 
         def report(at: Progress) -> None:
             left = "" if at.left is None else f", {_clock(at.left)} left"
             progress.start_task(bar)
-            progress.update(bar, completed=at.done, pace=f"{number(at.rate, 3)} runs/s{left}")
+            progress.update(bar, completed=at.done, total=at.total, pace=f"{number(at.rate, 3)} runs/s{left}")
 
-        return study.run(folder, workers=request.workers.chosen, on_progress=report, limit=request.limit)
+        given = {"workers": request.workers.chosen, "limit": request.limit, "shard": request.shard}
+        return study.run(request.folder, on_progress=report, **given)
 
 
-def _write_report(console: PlainConsole, folder: Path, result: SweepResult) -> None:
+def _write_report(console: PlainConsole, result: SweepResult) -> None:
     """Write the report, unless the sweep was interrupted: the user should not have to wait for it."""
     from .report import save_study_report
 
     if result.interrupted:
-        console.print_lines(f"no report: paraflex report {folder} writes it")
+        console.print_lines(f"no report: paraflex report {result.folder} writes it")
         return
-    save_study_report(folder, console)
-    console.print_lines(f"report: {folder / 'report.html'}")
+    save_study_report(result.folder, console)
+    console.print_lines(f"report: {result.folder / 'report.html'}")
 
 
 def _report(out: PlainConsole, console: PlainConsole, result: SweepResult) -> None:

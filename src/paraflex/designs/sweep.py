@@ -1,6 +1,7 @@
 """Sweeps: thousands of runs of a mechanism, one row each, whose results do not depend on workers and restarts."""
 
 import hashlib
+import re
 import time
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
@@ -186,9 +187,12 @@ class SweepStudy(Study["SweepResult"]):
         workers: Workers | None = None,
         on_progress: OnProgress | None = None,
         limit: int | None = None,
+        shard: str | None = None,
         run: RunTask = run_task,
     ) -> SweepResult:
         """Do the runs for which a folder has no rows yet; see `Study.run`.
+
+        Rows of shards in the folder are taken over.
 
         Parameters
         ----------
@@ -197,15 +201,21 @@ class SweepStudy(Study["SweepResult"]):
         limit : int, optional
             Largest number of runs in this session, rounded up to whole tasks (all modes of a design along a path); no
             limit by default.
+        shard : str, optional
+            Part of the runs, "3/8" for the third of eight, for several processes that share no memory, as in a batch
+            system: it is done in a folder of its own within the folder, `shard-3-of-8`. All runs by default.
         run : callable
             Function that does a task; by default `run_task`.
         """
         folder, setting = kept_in(folder), self.setting
+        part, parts = (1, 1) if shard is None else _part(shard)
+        if shard is not None:
+            folder = folder / f"shard-{part}-of-{parts}"
         if limit is not None and limit < 1:
             raise InputError("must be positive", field="--limit", value=limit, remedy="give the number of runs")
         account = study_account(self.name, setting, self.parameters, self.content(), runs=self.runs, sampling=self.kind)
         with open_campaign(folder, account, table_schema(setting, self.members), self._has) as campaign:
-            session = _Session(self, campaign, on_progress)
+            session = _Session(self, campaign, on_progress, slice(part - 1, None, parts))
             if session.complete:
                 return session.end(interrupted=False)
             compile_kernels_for(self.model().mechanism)
@@ -264,6 +274,7 @@ def sweep(
     *,
     workers: Workers | int | None = None,
     limit: int | None = None,
+    shard: str | None = None,
     on_progress: OnProgress | None = None,
     run: RunTask = run_task,
 ) -> SweepResult:
@@ -277,18 +288,29 @@ def sweep(
         Folder of the results.
     workers : Workers or int, optional
         Workers, or number of threads: see `Workers`.
-    limit, on_progress, run
+    limit, shard, on_progress, run
         Arguments of `SweepStudy.run`.
     """
     study = study if isinstance(study, SweepStudy) else load_sweep(study)
-    return study.run(folder, workers=Workers.of(workers), on_progress=on_progress, limit=limit, run=run)
+    return study.run(folder, workers=Workers.of(workers), on_progress=on_progress, limit=limit, shard=shard, run=run)
+
+
+def _part(shard: str) -> tuple[int, int]:
+    """Return the number of a shard and that of all shards."""
+    found = re.fullmatch(r"\s*(\d{1,9})\s*/\s*(\d{1,9})\s*", shard, re.ASCII)
+    part, parts = map(int, found.groups()) if found else (0, 0)
+    if not 1 <= part <= parts:
+        raise InputError(
+            "not a part of a study", field="--shard", value=shard, remedy="write 3/8 for the third of eight"
+        )
+    return part, parts
 
 
 class _Session:
     """Session of a sweep, with its finished tasks."""
 
-    def __init__(self, study: SweepStudy, campaign: Campaign, on_progress: OnProgress | None) -> None:
-        self.study, self.setting, self.campaign = study, study.setting, campaign
+    def __init__(self, study: SweepStudy, campaign: Campaign, on_progress: OnProgress | None, own: slice) -> None:
+        self.study, self.setting, self.campaign, self.own = study, study.setting, campaign, own
         self.on_progress = on_progress
         self.began, self.fresh = time.perf_counter(), 0
         rows = np.zeros(study.runs // len(self.setting.modes), dtype=np.intp)
@@ -309,7 +331,11 @@ class _Session:
 
     @property
     def complete(self) -> bool:
-        return bool(np.all(self.done))
+        return bool(np.all(self.done[self.own]))
+
+    @property
+    def runs(self) -> int:
+        return self.done[self.own].size * len(self.setting.modes)
 
     def go(self, engine: Engine, run: Callable[..., Outcome], limit: int | None) -> bool:
         """Do the remaining runs, close the engine, and return whether the user stopped the session."""
@@ -321,7 +347,7 @@ class _Session:
                     if self.on_progress is not None:
                         done, seconds = int(np.count_nonzero(self.done)), time.perf_counter() - began
                         modes = len(self.setting.modes)
-                        self.on_progress(Progress(done * modes, self.study.runs, self.fresh, seconds))
+                        self.on_progress(Progress(done * modes, self.runs, self.fresh, seconds))
         except KeyboardInterrupt:
             return True
         return False
@@ -334,7 +360,7 @@ class _Session:
             result = SweepResult(
                 name=self.study.name,
                 folder=self.campaign.folder.path,
-                total=self.study.runs,
+                total=self.runs,
                 counts={each["values"]: each["counts"] for each in table["status"].value_counts().to_pylist()},
                 fresh=self.fresh,
                 seconds=time.perf_counter() - self.began,
@@ -347,7 +373,7 @@ class _Session:
 
     def _tasks(self, limit: int | None) -> Iterator[Task]:
         given = 0
-        for number in range(self.done.size):
+        for number in range(self.done.size)[self.own]:
             if limit is not None and given >= limit:
                 return
             if not self.done[number]:

@@ -41,6 +41,10 @@ class SweepRequest(StudyRequest):
     study: str = argument("STUDY.toml", "Study file: parameters, runs, metrics.")
     workers: WorkersChoice = field(default_factory=WorkersChoice)
     limit: int | None = option("--limit N", "Number of runs this time, rounded up to whole designs.")
+    shard: str | None = option(
+        "--shard I/N", "Part I of N of the runs, in a folder of its own, for arrays of batch jobs; without it the same "
+        "command joins the parts."
+    )  # fmt: skip
     report: bool = report_switch()
     json: bool = json_switch()
 
