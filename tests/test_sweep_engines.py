@@ -8,6 +8,7 @@ import time
 import urllib.error
 import urllib.request
 from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
+from contextlib import contextmanager
 from multiprocessing import get_context
 
 import pandas as pd
@@ -17,7 +18,7 @@ import pytest
 from journals import rows_in
 from paraflex.campaign import LostCluster, Workers, open_engine, outcomes
 from paraflex.designs.run import Outcome, run_task
-from paraflex.errors import InputError
+from paraflex.errors import InputError, ResultWarning
 from paraflex.studies import load_sweep, sweep
 from processes import started
 
@@ -214,12 +215,21 @@ def test_ctrl_c_keeps_what_is_done_and_says_how_to_go_on(study, tmp_path):
 # --- Executors, and parts in processes of their own ----------------------------------------------------------------
 
 
+@contextmanager
+def changed_file(file, text):
+    """A file with another text for a while."""
+    whole = file.read_bytes()
+    file.write_text(text, encoding="utf-8")
+    yield
+    file.write_bytes(whole)
+
+
 def test_an_executor_of_ones_own_gives_the_same_table_and_lives_on(study, table, tmp_path):
     with ThreadPoolExecutor(2) as executor:
         found = sweep(study, tmp_path / "out", workers=Workers(executor))
         assert found.table.read_bytes() == table
         assert executor.submit(pow, 2, 3).result() == 8
-    with pytest.raises(RuntimeError, match="after shutdown"):
+    with pytest.raises(LostCluster, match="run the study again"):
         sweep(study, tmp_path / "shut", workers=Workers(executor))
 
 
@@ -253,10 +263,48 @@ def test_shards_that_are_none_are_refused(study, tmp_path, shard):
     assert not (tmp_path / "out").exists()
 
 
-def test_rows_of_another_study_in_a_shard_are_left_out(study, table, tmp_path):
+@pytest.mark.parametrize("change", [("seed = 5", "seed = 6"), ("samples = 26", 'samples = 26\nmetrics = ["work"]')])
+def test_shards_of_another_study_are_left_out(study, table, tmp_path, change):
     other = tmp_path / "other.toml"
-    other.write_text(STUDY.replace("seed = 5", "seed = 6"), encoding="utf-8")
+    other.write_text(STUDY.replace(*change), encoding="utf-8")
     sweep(load_sweep(other), tmp_path / "out", shard="1/2")
-    joined = sweep(study, tmp_path / "out")
+    # A process that was killed at once, and something else of a similar name.
+    (tmp_path / "out" / "shard-2-of-2").mkdir()
+    with pytest.warns(ResultWarning, match="shard-1-of-2: of another study"):
+        joined = sweep(study, tmp_path / "out")
     assert joined.fresh == joined.total
     assert joined.table.read_bytes() == table
+    with pytest.raises(InputError, match="results of another study"):
+        sweep(load_sweep(other), tmp_path / "out", shard="2/2")
+
+
+def test_damaged_shards_are_named_with_what_helps(study, table, tmp_path):
+    folder = tmp_path / "out"
+    shard = sweep(study, folder, shard="2/3").folder
+    with (
+        changed_file(shard / "study.json", "{}"),
+        pytest.raises(InputError, match="damaged, or of other results") as error,
+    ):
+        sweep(study, folder)
+    assert error.value.remedy == f"run it again with --shard 2/3, or delete {shard}"
+    journal = shard / "journal.sqlite"
+    shard.joinpath("results.parquet").unlink()
+    journal.write_bytes(journal.read_bytes().replace(b"complete", b"completE"))
+    with pytest.raises(InputError, match="damaged") as error:
+        sweep(study, folder)
+    assert "--shard 2/3" in error.value.remedy
+    sweep(study, folder, shard="2/3")
+    assert sweep(study, folder).table.read_bytes() == table
+
+
+def test_trajectories_of_shards_are_joined(tmp_path):
+    file = tmp_path / "study.toml"
+    file.write_text(STUDY.replace("samples = 26", "samples = 26\ntrajectories = true"), encoding="utf-8")
+    first = sweep(load_sweep(file), tmp_path / "out", shard="1/2")
+    joined = sweep(load_sweep(file), tmp_path / "out")
+    kept = {each.name: each.read_bytes() for each in (first.folder / "trajectories").iterdir()}
+    assert len(kept) == first.total
+    assert joined.fresh == joined.total - first.total
+    found = {each.name: each.read_bytes() for each in (tmp_path / "out" / "trajectories").iterdir()}
+    assert len(found) == joined.total
+    assert kept.items() <= found.items()

@@ -12,6 +12,7 @@ from .study import (
     Study as Study,
     WholeStudy as WholeStudy,
     Workers as Workers,
+    check_shared as check_shared,
     kept_in as kept_in,
     no_workers as no_workers,
     open_campaign as open_campaign,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import shutil
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator, Mapping
@@ -21,7 +22,7 @@ from paraflex.folders import STUDY_OF_RUNS, ResultsFolder, check_listed, files_o
 from paraflex.folders.changes import check_inside
 from paraflex.results.storage import write_results
 from paraflex.results.tables import read_parquet
-from paraflex.seals import damaged
+from paraflex.seals import check_seal, damaged
 from paraflex.writing import GO_ON, read_values, whole_file, write_json
 from .journal import JOURNAL, Journal, Row, write_journal
 from .tables import (
@@ -43,8 +44,8 @@ if TYPE_CHECKING:
 
 STUDY = "study.json"
 TRAJECTORIES = "trajectories"
-# Folders of the parts of a study that separate processes compute.
-SHARDS = "shard-*-of-*"
+# Names of the folders of the parts of a study that separate processes compute.
+_SHARD = re.compile(r"shard-(\d+)-of-(\d+)", re.ASCII)
 
 
 @dataclass(frozen=True)
@@ -128,7 +129,7 @@ def open_campaign(
             if not (folder / STUDY).exists():
                 with held.added_files() as new:
                     write_json(new / STUDY, study, remedy=GO_ON)
-            _join_shards(folder, journal, belongs)
+            _join_shards(folder, journal, study, schema, belongs)
             yield Campaign(held, journal)
 
 
@@ -152,6 +153,7 @@ def _check_ours(folder: Path) -> None:
     """Check that a folder holds a study or is empty."""
     if not any((folder / name).is_file() for name in (STUDY, JOURNAL)):
         names = [*files_of(folder), *foreign_files(folder)]
+        names = [name for name in names if not _is_shard(folder / name.partition("/")[0])]
         if names:
             problem = f"the folder holds other files ({', '.join(sorted(names)[:3])})"
             raise InputError(problem, field="--output", value=str(folder), remedy="name a new folder")
@@ -181,7 +183,7 @@ def _take_over(folder: Path, journal: Journal, schema: pa.Schema, belongs: Calla
     """Add the rows of existing tables to a new journal, from an earlier release or after the journal was deleted."""
     files = [folder / name for name in (RESULTS, UNFINISHED) if (folder / name).is_file()]
     for file in [*files, *sorted(folder.glob(EARLIER))]:
-        rows = _typed(file, schema).to_pylist()
+        rows = _typed(file, read_parquet(file), schema).to_pylist()
         ours = [row for row in rows if belongs(row)]
         if len(ours) < len(rows):
             text = f"{file}: {len(rows) - len(ours)} of its {len(rows)} rows are of another study, and are left out"
@@ -191,27 +193,65 @@ def _take_over(folder: Path, journal: Journal, schema: pa.Schema, belongs: Calla
     shutil.rmtree(folder / Path(EARLIER).parent, ignore_errors=True)
 
 
-def _join_shards(folder: Path, journal: Journal, belongs: Callable[[Row], bool]) -> None:
-    """Add the rows and trajectories of the shards in a folder that it does not have yet."""
-    shards = sorted(folder.glob(SHARDS))
+def check_shared(folder: Path, study: Mapping[str, Any]) -> None:
+    """Check that the folder of a study may hold shards of this one; see `open_campaign` for the errors."""
+    if (folder / STUDY).is_file():
+        _check_same(folder, read_study(folder / STUDY), study)
+    elif folder.is_dir():
+        _check_ours(folder)
+
+
+def _is_shard(place: Path) -> bool:
+    return bool(_SHARD.fullmatch(place.name)) and place.is_dir() and not place.is_symlink()
+
+
+def _join_shards(
+    folder: Path, journal: Journal, study: Mapping[str, Any], schema: pa.Schema, belongs: Callable[[Row], bool]
+) -> None:
+    """Add the rows and trajectories of the shards in a folder that it does not have yet.
+
+    Raises
+    ------
+    InputError
+        Shard that is damaged, or of other versions.
+    """
+    shards = sorted(filter(_is_shard, folder.iterdir()))
     known = set(journal.runs()) if shards else set()
     for shard in shards:
-        for file in sorted(shard.glob(f"{TRAJECTORIES}/*.nc")):
-            own = f"{TRAJECTORIES}/{file.name}"
-            check_inside(folder, own)
-            if not (folder / own).exists():
-                with whole_file(folder / own, remedy=GO_ON) as new:
-                    shutil.copyfile(file, new)
-        rows = [row for file in tables_of(shard) for row in read_table(file).to_pylist()]
-        new = [row for row in rows if row["run"] not in known and belongs(row)]
+        # A process that ended at once has left nothing.
+        if not (shard / STUDY).is_file():
+            continue
+        part, parts = shard.name.split("-")[1::2]
+        again = f"run it again with --shard {part}/{parts}, or delete {shard}"
+        try:
+            stored = read_study(shard / STUDY)
+            if stored["content"] != study["content"]:
+                text = f"{shard}: of another study, or of this one before it was changed: it is left out"
+                warn_user(ResultWarning(text))
+                continue
+            _check_same(shard, stored, study)
+            rows = [row for file in tables_of(shard) for row in _typed(file, read_table(file), schema).to_pylist()]
+            new = [row for row in rows if row["run"] not in known and belongs(row)]
+            for row in new:
+                _copy_trajectory(shard / TRAJECTORIES / f"{row['id']}.nc", folder, again)
+        except InputError as error:
+            raise error.advising(again) from None
         journal.add(new)
         known.update(row["run"] for row in new)
     journal.commit()
 
 
-def _typed(file: Path, schema: pa.Schema) -> pa.Table:
-    """Read a table, and check that its columns have the types of the study's columns."""
-    found = read_parquet(file)
+def _copy_trajectory(file: Path, folder: Path, remedy: str) -> None:
+    name = f"{TRAJECTORIES}/{file.name}"
+    if file.is_file() and not file.is_symlink() and not (folder / name).exists():
+        check_seal(file, remedy)
+        check_inside(folder, name)
+        with whole_file(folder / name, remedy=GO_ON) as new:
+            shutil.copyfile(file, new)
+
+
+def _typed(file: Path, found: pa.Table, schema: pa.Schema) -> pa.Table:
+    """Return the table of a file after a check that its columns have the types of the study's columns."""
     if not {"run", "id", "status"} <= set(found.column_names):
         raise damaged(file, "not a table of runs", "delete it and run the same command again")
     for column in found.schema:

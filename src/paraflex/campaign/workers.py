@@ -32,6 +32,7 @@ _DEATHS = 2
 # Time limit for the answer of a scheduler, and interval between two counts of a cluster's workers [s].
 _REACHED_WITHIN, _RECOUNT = 10.0, 5.0
 _GONE = "the cluster no longer answers; run the same command again: it goes on from there"
+_ENDED = "the executor no longer takes calls; run the study again with a new one: it goes on from there"
 # Switch interval of Python's threads [s], short because runs release the GIL and request it again often.
 _SWITCH = 2e-4
 
@@ -242,7 +243,11 @@ class Given(Engine):
 
     def submit(self, function: Callable[..., Any], *arguments: Any) -> Future[Any]:
         """Submit a function call; see `Engine`."""
-        call = super().submit(function, *arguments)
+        try:
+            call = super().submit(function, *arguments)
+        except RuntimeError:
+            # It is broken, or was shut down.
+            raise LostCluster(_ENDED) from None
         self._calls.add(call)
         call.add_done_callback(self._calls.discard)
         return call

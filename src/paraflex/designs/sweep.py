@@ -24,6 +24,7 @@ from paraflex.campaign import (
     Row,
     Study,
     Workers,
+    check_shared,
     kept_in,
     open_campaign,
     outcomes,
@@ -209,11 +210,12 @@ class SweepStudy(Study["SweepResult"]):
         """
         folder, setting = kept_in(folder), self.setting
         part, parts = (1, 1) if shard is None else _part(shard)
-        if shard is not None:
-            folder = folder / f"shard-{part}-of-{parts}"
         if limit is not None and limit < 1:
             raise InputError("must be positive", field="--limit", value=limit, remedy="give the number of runs")
         account = study_account(self.name, setting, self.parameters, self.content(), runs=self.runs, sampling=self.kind)
+        if shard is not None:
+            check_shared(folder, account)
+            folder = folder / f"shard-{part}-of-{parts}"
         with open_campaign(folder, account, table_schema(setting, self.members), self._has) as campaign:
             session = _Session(self, campaign, on_progress, slice(part - 1, None, parts))
             if session.complete:
