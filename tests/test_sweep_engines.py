@@ -2,6 +2,7 @@
 
 import json
 import os
+import shutil
 import signal
 import sys
 import time
@@ -293,7 +294,7 @@ def test_damaged_shards_are_named_with_what_helps(study, table, tmp_path):
     with pytest.raises(InputError, match="damaged") as error:
         sweep(study, folder)
     assert "--shard 2/3" in error.value.remedy
-    sweep(study, folder, shard="2/3")
+    shutil.rmtree(shard)
     assert sweep(study, folder).table.read_bytes() == table
 
 
