@@ -86,7 +86,7 @@ def test_runs_sensors_and_stresses_are_those_of_the_whole_beam():
 def test_a_run_whose_energy_does_not_balance_says_so():
     model = pf.load("leaf_spring_guide")
     with pytest.warns(pf.ResultWarning, match="energy and work do not balance"):
-        run = pf.simulate_motion(model, 0.1, samples=51, options=pf.IntegrationOptions(tolerance=1e-3))
+        run = pf.simulate_motion(model, 0.1, samples=51, options=pf.IntegrationOptions(method="tr-bdf2", step=1e-2))
     assert any(one.code == "energy-unbalanced" for one in run.findings)
     other = pf.simulate_motion(model, 0.1, samples=51)
     assert not any(one.code == "energy-unbalanced" for one in other.findings)

@@ -255,7 +255,7 @@ def pendulum(body, start=0.4, **changes):
     return Mechanism("pendulum", **(values | changes))
 
 
-def swing(mechanism, tolerance=1e-5):
+def swing(mechanism, tolerance=1e-9):
     """Joint positions, joint force multipliers, energies; equal steps, which rounding does not move."""
     options = IntegrationOptions(tolerance=tolerance, step=2e-5)
     run = simulate_motion(mechanism, 0.3, samples=31, torques={"drive": 0.2}, options=options)

@@ -192,7 +192,7 @@ def test_a_motor_works_through_a_singular_position():
     # A step may straddle the pole; one that ends beside it is told, and may be shorter than the samples are apart.
     assert run.singular_positions or not missing.any()
     np.testing.assert_allclose(run.singular_positions, in_line, rtol=0, atol=1e-3)
-    assert np.all(np.abs(run.t[missing] - in_line) < 5e-3)
+    assert np.all(np.abs(run.t[missing] - in_line) < 2e-2)
 
 
 def test_a_chain_of_two_swings_as_a_double_pendulum_with_a_spring():
