@@ -33,6 +33,8 @@ from .held import held_modes, place_rows, slope_rows
 
 # An entry of the damping matrix below this fraction of the damping of its two modes is rounding.
 _ROUNDED_ENTRY = 1e-9
+# Squares of frequencies of the held body below this fraction of the largest one of its modes are rounding.
+_ROUNDED_SQUARE = 1e-15
 
 
 def damping_matrix(placed: PlacedBodies, name: str) -> Array:
@@ -46,6 +48,11 @@ def damping_matrix(placed: PlacedBodies, name: str) -> Array:
         Bodies of the mechanism, whose joints hold the body.
     name : str
         Name of the body.
+
+    Raises
+    ------
+    numpy.linalg.LinAlgError
+        Frequencies of the held body are rounding.
     """
     body, described = placed.bodies[placed.index[name]], placed.mechanism.body(name)
     if isinstance(described, RigidBody) or described.damping is None or body.nf == 0:
@@ -56,6 +63,8 @@ def damping_matrix(placed: PlacedBodies, name: str) -> Array:
         return np.diag(beta * squares)
     held = np.array(list(_conditions(placed, name))).reshape(-1, 3 + body.nf)
     omega, modes = held_modes(body, held)
+    if np.min(np.real(omega), initial=np.inf) ** 2 < _ROUNDED_SQUARE * np.max(np.real(squares)):
+        raise np.linalg.LinAlgError("frequencies that are rounding")
     # Held modes are (nf, k), in coordinates with the stiffness diag(squares).
     lost = described.damping.coefficients(omega) / omega**2
     forces = squares[:, None] * modes / omega
