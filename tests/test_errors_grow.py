@@ -85,8 +85,8 @@ def test_where_a_coarser_tolerance_does_not_do_what_it_led_to_counts(monkeypatch
 def test_errors_of_loose_tolerances_grow_too(tolerance):
     # Steps hardly change with these tolerances: they are limited by how far bodies turn.
     options = {"tolerance": tolerance, "tolerance_per": "cycle"}
-    run, exact = simulate(chain((2.0, 2.5)), 8.0, **options), simulate(chain((2.0, 2.5)), 8.0, tolerance=1e-9)
-    assert np.max(np.abs(run.solution.q - exact.solution.q)) > 3.0 * tolerance
+    run, exact = simulate(chain((2.0, 2.5)), 12.0, **options), simulate(chain((2.0, 2.5)), 12.0, tolerance=1e-9)
+    assert np.max(np.abs(run.solution.q - exact.solution.q)) > 0.01
     assert found(run)
 
 

@@ -179,7 +179,7 @@ def test_a_motor_works_through_a_singular_position():
     system, start = started(dataclasses.replace(row, motors=(Motor("drive", "A0"),), gravity=(0.0, 0.0)))
     run = simulate_motion(
         system.mechanism, 1.2, samples=4801, start=start, torques={"drive": -9.0},
-        options=IntegrationOptions(tolerance=1e-6),
+        options=IntegrationOptions(tolerance=1e-7),
     ).solution  # fmt: skip
     # J phi'' = -9 N m with J = 3 kg m^2: from pi/2 at -1 rad/s.
     exact = 0.5 * np.pi - run.t - 1.5 * run.t**2
@@ -192,7 +192,7 @@ def test_a_motor_works_through_a_singular_position():
     # A step may straddle the pole; one that ends beside it is told, and may be shorter than the samples are apart.
     assert run.singular_positions or not missing.any()
     np.testing.assert_allclose(run.singular_positions, in_line, rtol=0, atol=1e-3)
-    assert np.all(np.abs(run.t[missing] - in_line) < 2e-2)
+    assert np.all(np.abs(run.t[missing] - in_line) < 5e-3)
 
 
 def test_a_chain_of_two_swings_as_a_double_pendulum_with_a_spring():

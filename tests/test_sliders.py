@@ -28,11 +28,11 @@ def crank_errors(tolerance):
 def test_simeons_slider_crank_ends_where_it_is_published():
     # The printed problem has 15 times the axial inertia; from its start, with next to no axial vibration, that hardly
     # matters: references differ by some 1e-7.
-    rough, fine = (crank_errors(tolerance) for tolerance in (1e-3, 1e-6))
+    rough, fine = (crank_errors(tolerance) for tolerance in (2e-3, 1e-6))
     assert np.all(fine < 3e-7), fine
     # Errors follow the tolerance. Between the two they lie within a factor of ten or so, by how a processor rounds: the
     # rod's axial vibration amplifies it.
-    assert 1e-6 < rough[0] < 2e-4, rough
+    assert 1e-5 < rough[0] < 2e-4, rough
 
 
 def test_the_published_start_is_consistent():

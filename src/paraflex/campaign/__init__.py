@@ -17,6 +17,7 @@ from .study import (
     no_workers as no_workers,
     open_campaign as open_campaign,
     read_study as read_study,
+    shard_folder as shard_folder,
 )
 from .tables import (
     checked_rows as checked_rows,

@@ -201,6 +201,11 @@ def check_shared(folder: Path, study: Mapping[str, Any]) -> None:
         _check_ours(folder)
 
 
+def shard_folder(folder: Path, part: int, parts: int) -> Path:
+    """Return the folder of a part of a study within that of the study."""
+    return folder / f"shard-{part}-of-{parts}"
+
+
 def _is_shard(place: Path) -> bool:
     return bool(_SHARD.fullmatch(place.name)) and place.is_dir() and not place.is_symlink()
 
@@ -221,7 +226,7 @@ def _join_shards(
         # A process that ended at once has left nothing.
         if not (shard / STUDY).is_file():
             continue
-        part, parts = shard.name.split("-")[1::2]
+        part, parts = _SHARD.findall(shard.name)[0]
         again = f"run it again with --shard {part}/{parts}, or delete {shard}"
         try:
             stored = read_study(shard / STUDY)

@@ -28,6 +28,7 @@ from paraflex.campaign import (
     kept_in,
     open_campaign,
     outcomes,
+    shard_folder,
     table_name,
 )
 from paraflex.compilation import compile_kernels_for
@@ -215,7 +216,7 @@ class SweepStudy(Study["SweepResult"]):
         account = study_account(self.name, setting, self.parameters, self.content(), runs=self.runs, sampling=self.kind)
         if shard is not None:
             check_shared(folder, account)
-            folder = folder / f"shard-{part}-of-{parts}"
+            folder = shard_folder(folder, part, parts)
         with open_campaign(folder, account, table_schema(setting, self.members), self._has) as campaign:
             session = _Session(self, campaign, on_progress, slice(part - 1, None, parts))
             if session.complete:
