@@ -128,7 +128,8 @@ def time_of(page: Page) -> float:
 
 
 def coloured(page: Page) -> list[int]:
-    """How many pixels of the canvas have very nearly each colour of the page's palette."""
+    """How many pixels of the canvas have very nearly each colour of the page's palette, after it is painted."""
+    wait_for_drawing(page)
     return page.evaluate(
         """() => {
             const canvas = document.getElementById("canvas");
