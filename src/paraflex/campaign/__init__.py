@@ -1,10 +1,16 @@
 """Base classes of studies and results, and for studies of many runs the workers, the journal and the tables."""
 
-from .journal import Journal as Journal, Row as Row
-from .study import (
+from .folder import (
     STUDY as STUDY,
     TRAJECTORIES as TRAJECTORIES,
     Campaign as Campaign,
+    check_shared as check_shared,
+    open_campaign as open_campaign,
+    read_study as read_study,
+    shard_folder as shard_folder,
+)
+from .journal import Journal as Journal, Row as Row
+from .study import (
     KeptResult as KeptResult,
     OnProgress as OnProgress,
     Progress as Progress,
@@ -12,12 +18,8 @@ from .study import (
     Study as Study,
     WholeStudy as WholeStudy,
     Workers as Workers,
-    check_shared as check_shared,
     kept_in as kept_in,
     no_workers as no_workers,
-    open_campaign as open_campaign,
-    read_study as read_study,
-    shard_folder as shard_folder,
 )
 from .tables import (
     checked_rows as checked_rows,
