@@ -20,6 +20,7 @@ from paraflex.folders import ResultsFolder
 from paraflex.integrators import IntegrationOptions
 from paraflex.kinematics import Path
 from paraflex.mechanism import ActuationMode, Geometry, Mechanism, proportional_segments
+from paraflex.reduced_bodies import AUTO, Reduction, reduced_task
 from paraflex.results.findings import keep_findings, verdict_of
 from paraflex.studies.tracking import Simulator, StudyResult, TrackingStudy
 from paraflex.tracking import TrackingRun, TrackingTask, simulate
@@ -27,7 +28,7 @@ from .bars import bars
 from .collected import apart, collected
 from .commands.runs import RunRequest
 from .ending import exit_code, print_results, where, write_drawn, write_numbers
-from .integration import kept_coordinates, reduced_as_requested, run_parameters
+from .integration import kept_coordinates, locating_reduction, run_parameters
 from .request import acting_controllers, command_provenance, controller_arguments, located_error, plan_study
 from .run_lines import failures, print_runs
 from .stops import check_stops
@@ -66,7 +67,7 @@ def run_along(
     planned = []
     # All paths are planned first, so that one that cannot be followed is refused before any run.
     for name, (path, folder) in paths.items():
-        task, full = requested_tasks(request, model, mechanism, (path, name), modes)
+        task, full, reduction = requested_tasks(request, model, mechanism, (path, name), modes, options)
         if request.segments is not None:
             check_stops(task.mechanism, options, request.stop_at)
         run = {
@@ -83,24 +84,34 @@ def run_along(
         findings = check_planned(model, task, name, modes, request.plan.assembly)
         method, error = own_method(request, options, controllers), model.study.error
         study = TrackingStudy(
-            task, modes, options, parameters, method, error, warning=False, findings=findings, full=full
-        )
+            task, modes, options, parameters, method, error, warning=False, findings=findings, full=full,
+            reduction=reduction,
+        )  # fmt: skip
         planned.append(_Along(name, study, folder, f'path "{name}": ' if len(paths) > 1 else ""))
     return _run(request, model, planned, _model_name(request, mechanism), began)
 
 
 def requested_tasks(
-    request: RunRequest, model: Model, mechanism: Mechanism, along: tuple[Path, str], modes: Sequence[ActuationMode]
-) -> tuple[TrackingTask, TrackingTask | None]:
+    request: RunRequest,
+    model: Model,
+    mechanism: Mechanism,
+    along: tuple[Path, str],
+    modes: Sequence[ActuationMode],
+    options: IntegrationOptions,
+) -> tuple[TrackingTask, TrackingTask | None, Reduction | None]:
     """Plan a path as it is run: with all coordinates, in finite segments, or with few coordinates.
 
-    The second task is the plan with all coordinates if the first has few, otherwise None.
+    The second task is the plan with all coordinates, to be run for comparison, if a number of coordinates is requested.
     """
     task = plan_study(model, mechanism, *along, request.plan, request.after)
     if request.segments is not None:
-        return task.in_segments(proportional_segments(mechanism, request.segments)), None
+        return task.in_segments(proportional_segments(mechanism, request.segments)), None, None
     kept = kept_coordinates(request, model.study)
-    return (task, None) if kept is None else (task.remodelled(reduced_as_requested(request, task, kept, modes)), task)
+    if kept is None or (kept == AUTO and not task.system.n_flexible):
+        return task, None, None
+    with locating_reduction(request):
+        few, reduction = reduced_task(task, kept, options.tolerance_for(task.system), modes)
+    return few, task if reduction is None else None, reduction
 
 
 def _run(request: RunRequest, model: Model, planned: Sequence[_Along], fidelity: str, began: float) -> int:

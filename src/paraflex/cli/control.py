@@ -70,8 +70,9 @@ def _study(request: CompareLawsRequest, model: Model, laws: Laws, paths: Paths, 
             "modes": [mode.name for mode in modes],
             "reduced": model.study.reduced,
         }
+        few = reduced_tasks(model, tasks, modes, options)
         return LawStudy(
-            reduced_tasks(model, tasks, modes), laws, modes, options, request.metrics, ErrorSpan(model.study.error),
+            few, laws, modes, options, request.metrics, ErrorSpan(model.study.error),
             command_provenance(model, requested | options.to_dict()),
         )  # fmt: skip
 

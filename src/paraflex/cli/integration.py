@@ -1,16 +1,16 @@
 """Settings of a run from options or the model's [study]: method, steps, constraints, number of coordinates."""
 
-from collections.abc import Sequence
+import re
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import asdict
-from typing import Any
+from typing import Any, Literal
 
 from paraflex.errors import InputError
 from paraflex.files import StudyDefaults
 from paraflex.integrators import IntegrationOptions, Treatment
-from paraflex.mechanism import ActuationMode, Mechanism
-from paraflex.motion import MotionRun
-from paraflex.reduced_bodies import reduced_mechanism
-from paraflex.tracking import TrackingTask
+from paraflex.mechanism import Mechanism
+from paraflex.reduced_bodies import AUTO
 from .commands.requests import flags
 from .commands.runs import RunRequest
 from .request import conflict
@@ -81,7 +81,7 @@ def _parameter(text: str) -> tuple[str, float]:
 
 
 def run_parameters(
-    request: RunRequest, mechanism: Mechanism, options: IntegrationOptions, reduced: int | None
+    request: RunRequest, mechanism: Mechanism, options: IntegrationOptions, reduced: int | str | None
 ) -> dict[str, Any]:
     """Return the settings of a run, for provenance; `mechanism` is the one that ran."""
     found = {
@@ -111,19 +111,29 @@ def run_parameters(
     }
 
 
-def kept_coordinates(request: RunRequest, study: StudyDefaults) -> int | None:
+def reduced_option(request: RunRequest) -> int | Literal["auto"] | None:
+    """Return the number of flexible coordinates requested, "auto", or None."""
+    text = request.reduced
+    if text is None or text == AUTO:
+        return text
+    if not re.fullmatch(r"\d+", text, re.ASCII):
+        remedy = f"give a number, {AUTO} for as few as the tolerance allows, or 0 for all"
+        raise InputError("no number of flexible coordinates", field="--reduced", value=text, remedy=remedy)
+    return int(text)
+
+
+def kept_coordinates(request: RunRequest, study: StudyDefaults) -> int | Literal["auto"] | None:
     """Return the number of flexible coordinates that a run keeps, as requested or set in the study; None for all."""
     if request.rigid or request.ked or request.segments is not None:
         return None
-    return (study.reduced if request.reduced is None else request.reduced) or None
+    return (study.reduced if request.reduced is None else reduced_option(request)) or None
 
 
-def reduced_as_requested(
-    request: RunRequest, along: TrackingTask | MotionRun, count: int, modes: Sequence[ActuationMode] | None = None
-) -> Mechanism:
-    """Return the mechanism reduced to `count` coordinates along a plan or a run; errors name the option or field."""
+@contextmanager
+def locating_reduction(request: RunRequest) -> Iterator[None]:
+    """Name the option or field in errors of a reduction."""
     try:
-        return reduced_mechanism(along, count, modes=modes)
+        yield
     except InputError as error:
         if error.field not in ("coordinates", "mechanism"):
             raise

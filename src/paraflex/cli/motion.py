@@ -23,7 +23,7 @@ from paraflex.formatting import number, quantity
 from paraflex.integrators import IntegrationOptions
 from paraflex.mechanism import Mechanism
 from paraflex.motion import MotionRun, state_at
-from paraflex.reduced_bodies import size_of
+from paraflex.reduced_bodies import AUTO, reduced_mechanism, size_of
 from paraflex.results import motion_dataset, motion_summary
 from paraflex.results.findings import validity_line
 from paraflex.results.reduced_runs import compared_with_full
@@ -32,7 +32,7 @@ from .collected import collected
 from .commands.options import PlanChoice
 from .commands.runs import RunRequest
 from .ending import exit_code, print_location, print_results, write_drawn, write_numbers
-from .integration import kept_coordinates, reduced_as_requested, run_parameters
+from .integration import kept_coordinates, locating_reduction, run_parameters
 from .replacing import hold_results
 from .request import acting_controllers, command_provenance, controller_arguments, locating_errors
 from .run_lines import load_lines
@@ -62,16 +62,23 @@ def run_motion(request: RunRequest, model: Model, mechanism: Mechanism, options:
             value=request.after,
             remedy="leave it out",
         )
+    kept = kept_coordinates(request, study)
+    if kept == AUTO:
+        raise InputError(
+            "as few coordinates as the tolerance allows are chosen from a planned path, and there is none",
+            field="study.reduced" if request.reduced is None else "--reduced", value=AUTO, remedy="give a number",
+        )  # fmt: skip
     with hold_results(request.out, RUN, force=request.force) as folder:
         console, model = PlainConsole(stderr=True), replace(model, study=study)
         compile_kernels_for(mechanism, console.print)
         began = time.perf_counter()
         controllers = acting_controllers(model, request)
         full = _simulate(console, model, mechanism, options, controllers, balanced=request.balanced)
-        run, kept = full, kept_coordinates(request, study)
+        run = full
         # A full run that failed is no reference for a reduced one.
         if kept is not None and full.solution.status in DONE_STATUSES:
-            few = reduced_as_requested(request, full, kept)
+            with locating_reduction(request):
+                few = reduced_mechanism(full, int(kept))
             start = None
             if not request.balanced:
                 start = nearest_state(build_system(few), full.system, _first(full))

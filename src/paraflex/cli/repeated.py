@@ -93,7 +93,7 @@ def _runs(
         yield own_run(mechanism, study, controllers, warning=True, start=start, options=options)
         return
     chosen = [parse_mode(mechanism, mode) for mode in modes]
-    task, _ = requested_tasks(request, model, mechanism, find_path(model, path), chosen)
+    task = requested_tasks(request, model, mechanism, find_path(model, path), chosen, options)[0]
     run = own_method(request, options, controllers) or partial(simulate, options=options, warning=False)
     for mode in modes:
         yield run(task, mode)

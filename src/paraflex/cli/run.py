@@ -13,7 +13,7 @@ from paraflex.writing import portable_name
 from .along import run_along
 from .commands.requests import flagged
 from .commands.runs import RunRequest
-from .integration import given_flags, integration_options
+from .integration import given_flags, integration_options, reduced_option
 from .motion import run_motion
 from .replacing import hold_results
 from .request import conflict, find_modes, find_paths, requested_model, with_frames
@@ -82,7 +82,7 @@ def _check_fidelity(request: RunRequest) -> None:
         raise InputError(
             "cannot be combined", field=requested[0], value=" ".join(requested), remedy="choose one of them"
         )
-    if request.reduced and any(flag != "--geometry" for flag in requested):
+    if reduced_option(request) and any(flag != "--geometry" for flag in requested):
         raise conflict(f"has no effect with {requested[0]}", "--reduced", request.reduced)
     for name, given in asdict(request.frames).items():
         if given is not None and (request.rigid or request.segments is not None):

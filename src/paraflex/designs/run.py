@@ -20,7 +20,7 @@ from paraflex.files import Model
 from paraflex.integrators import IntegrationOptions
 from paraflex.mechanism import Geometry, Mechanism
 from paraflex.motion import MotionRun, state_at
-from paraflex.reduced_bodies import reduced_mechanism
+from paraflex.reduced_bodies import reduced_task
 from paraflex.results import motion_dataset, statics_dataset, tracking_dataset
 from paraflex.results.metrics import METRICS, Members
 from paraflex.tracking import TrackingTask, simulate
@@ -141,7 +141,7 @@ def ready(setting: Setting, task: Task) -> tuple[Planned, IntegrationOptions]:
     """
     model, options = setting.design(task.values)
     if setting.has_path:
-        return along_path(_planned(setting, model, task), model.acting(), options), options
+        return along_path(_planned(setting, model, task, options), model.acting(), options), options
     _compile(model.mechanism)
     if setting.statics:
         # By default the start is the model's own, else the assembly of its study.
@@ -165,17 +165,18 @@ def plan_task(setting: Setting, task: Task) -> tuple[TrackingTask, IntegrationOp
         The values are invalid, or the path is out of reach.
     """
     model, options = setting.design(task.values)
-    return _planned(setting, model, task), options
+    return _planned(setting, model, task, options), options
 
 
-def _planned(setting: Setting, model: Model, task: Task) -> TrackingTask:
+def _planned(setting: Setting, model: Model, task: Task, options: IntegrationOptions) -> TrackingTask:
     _compile(model.mechanism)
     planned = model.plan(
         task.path, duration=setting.duration, samples=setting.samples, assembly=setting.assembly, warning=False
     )
     if model.study.reduced:
         # The reduced coordinates are selected for each design from its plan alone, without a run of the full model.
-        planned = planned.remodelled(reduced_mechanism(planned, model.study.reduced, modes=setting.modes))
+        tolerance = options.tolerance_for(planned.system)
+        planned, _ = reduced_task(planned, model.study.reduced, tolerance, setting.modes)
     return planned
 
 

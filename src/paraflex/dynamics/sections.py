@@ -157,7 +157,8 @@ class _Beam(NamedTuple):
 def sections_of(system: System) -> Sections | None:
     """Return the stations of a system's flexible beams; None if there are none.
 
-    Rigid and modal bodies have no section forces: their internal structure is not known.
+    Rigid and modal bodies have no section forces: their internal structure is not known. Nor have beams reduced to the
+    shapes of a motion, whose curvatures may be wrong by several times although their deflections are right.
     """
     return system.once("sections", lambda: _sections(system))
 
@@ -166,7 +167,9 @@ def _sections(system: System) -> Sections | None:
     parts = tuple(
         _stations(described, system)
         for described in system.mechanism.bodies
-        if isinstance(described, FlexibleBeam | AssumedModesBeam) and system.body(described.name).nf
+        if isinstance(described, FlexibleBeam | AssumedModesBeam)
+        and system.body(described.name).nf
+        and described.name not in system.mechanism.bases
     )
     if not parts:
         return None

@@ -187,8 +187,11 @@ class Saddle:
         self._factor = scipy.sparse.linalg.splu(scipy.sparse.csc_matrix(self._matrix + scipy.sparse.diags(regular)))
 
     def solve(self, f: Array | float = 0.0, r: Array | float = 0.0) -> tuple[Array, Array]:
-        """Solve for x (n,) and mu (m,) with right-hand sides f (n,) and r (m,); either may be zero."""
-        right = np.concatenate([self._column * f, self._row * r])
+        """Solve for x (n,) and mu (m,) with right-hand sides f (n,) and r (m,); either may be zero.
+
+        Both may have several columns, (n, k) and (m, k), and so then have x and mu.
+        """
+        right = np.concatenate([(self._column * np.transpose(f)).T, (self._row * np.transpose(r)).T])
         z = self._factor.solve(right)
         left = right - self._matrix @ z
         for _ in range(_REFINEMENTS):
@@ -197,7 +200,7 @@ class Saddle:
             if not np.linalg.norm(rest) < _WORTH_WHILE * np.linalg.norm(left):
                 break
             z, left = better, rest
-        return self._column * z[: self._n], self._row * z[self._n :]
+        return (self._column * z[: self._n].T).T, (self._row * z[self._n :].T).T
 
 
 class Factor:

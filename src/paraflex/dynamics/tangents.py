@@ -176,6 +176,10 @@ class Tangency:
         point = MotionPoint(time, q, still, still, np.zeros(self.system.m), acting)
         return self._columns(point, INDEX_1, ACCELERATION)
 
+    def stiffness(self, point: MotionPoint) -> csr_matrix:
+        """Return K (n, n) alone, without springs, dampers and friction at joints."""
+        return self._columns(point, INDEX_1, COORDINATE)[0]
+
     def at(self, point: MotionPoint) -> Tangents:
         """Return the tangent matrices at a point of a motion."""
         mass, jacobian = self._columns(point, INDEX_1, ACCELERATION)

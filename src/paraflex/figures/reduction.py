@@ -10,7 +10,7 @@ import xarray as xr
 from paraflex.formatting import display_unit, number, quantity, text_symbol
 from paraflex.results.following import HEADLINE, ErrorSpan
 from paraflex.results.linear_summary import HELD_WORDS, HOLDINGS
-from paraflex.results.reduced_runs import COUNTS, DISTANCE, FULL as OF_FULL, reduced_run_figures
+from paraflex.results.reduced_runs import COUNTS, DISTANCE, ESTIMATE, FULL as OF_FULL, reduced_run_figures
 from paraflex.results.reduction_summary import FULL, OWN, STATIC, along_summary
 from .charts import PLAIN_LOOK, Axis, Chart, Curve, Look, Span, look
 from .entry import NOTHING, figure
@@ -256,7 +256,7 @@ def bound_sentences(data: xr.Dataset) -> Iterator[str]:
 
 def reduced_runs(data: xr.Dataset) -> Iterator[Table]:
     """Yield the table of the reduced runs of a dataset; none for runs with all flexible coordinates."""
-    if DISTANCE not in data:
+    if DISTANCE not in data and ESTIMATE not in data:
         return
     error = HEADLINE[ErrorSpan(data.attrs["error"])] if "mode" in data.dims else ""
     runs = [data.isel(mode=r) for r in range(data.sizes["mode"])] if error else [data]
@@ -284,21 +284,26 @@ def reduced_runs_table(
         Name of the tracking error among the numbers; empty for runs without a path.
     """
     found = [(names, one, one["reduction"]) for names, one in runs if one.get("reduction") is not None]
+    estimates = [one.get("estimate") for _, _, one in found]
     columns = [Column(head, [names[k] for names, _, _ in found]) for k, head in enumerate(heads)]
 
     def combined(combine: Any, name: str) -> list[float | None]:
         pairs = [(one.get(name), full.get(OF_FULL + name)) for _, one, full in found]
         return [None if None in pair else combine(*pair) for pair in pairs]
 
+    words = reduced_words(found[0][2]) if found else ""
+    rows = {names[-1]: r for r, (names, _, _) in enumerate(found)} if error else None
+    if None not in estimates:
+        columns.append(Column("estimated deviation", estimates, "m", digits=2))
+    if not any("distance" in one for _, _, one in found):
+        return Table("Reduced bodies", columns, f"{words}. The deviation is that from positions with all.", rows)
     if error:
         columns += [Column("full error", [full[OF_FULL + error] for _, _, full in found], "m"),
                     Column("off", combined(lambda few, full: few - full, error), "m", digits=2)]  # fmt: skip
     columns += [Column("distance", [full["distance"] for _, _, full in found], "m", digits=2),
                 Column("relative time", combined(lambda few, full: few / full, "wall_time"), digits=2)]  # fmt: skip
     whose = "the end-effector" if error else "a named point"
-    words = reduced_words(found[0][2]) if found else ""
-    return Table("Reduced bodies", columns, f"{words}. Distance: the largest of {whose} from its place with all.",
-                 {names[-1]: r for r, (names, _, _) in enumerate(found)} if error else None)  # fmt: skip
+    return Table("Reduced bodies", columns, f"{words}. Distance: the largest of {whose} from its place with all.", rows)
 
 
 def reduced_words(one: Mapping[str, Any]) -> str:

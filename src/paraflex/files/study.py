@@ -85,8 +85,10 @@ class StudyDefaults:
     after: Literal["free", "hold"] = optional(
         "free", 'what the active motors do after the path: "free" or "hold", by brakes'
     )
-    reduced: int | None = optional(
-        None, "the number of flexible coordinates kept, all bodies together; all by default, or with 0"
+    reduced: int | Literal["auto"] | None = optional(
+        None,
+        'the number of flexible coordinates kept, all bodies together, or "auto" for as few as the tolerance allows; '
+        "all by default, or with 0",
     )
     error: Literal["motion", "whole"] = optional(
         "motion", 'the tracking error that ranks modes: of the "motion", or the "whole" run with dwell'
@@ -168,10 +170,10 @@ def check_study(mechanism: Mechanism, paths: Mapping[str, Path], study: StudyDef
         known(name, motors, "study.torques", "motor")
     if study.assembly is not None:
         known(study.assembly, [one.name for one in mechanism.assemblies], "study.assembly", "assembly")
-    if study.reduced is not None and study.reduced < 0:
+    if isinstance(study.reduced, int) and study.reduced < 0:
         raise InputError(
             "no such number of flexible coordinates", field="study.reduced", value=study.reduced,
-            remedy="give the number to keep, 0 or nothing for all",
+            remedy='give the number to keep, "auto", or 0 or nothing for all',
         )  # fmt: skip
     with within("study"):
         check_times(study.duration, study.samples)

@@ -4,144 +4,52 @@ Deflections u of a body, in modes of unit mass and frequencies omega, have the s
 singular value decomposition of omega u over all deflections gives directions and their shares of the energy (proper
 orthogonal decomposition). The directions with the largest shares are kept, over all bodies together.
 
-Deflections along a planned motion are computed without a run. At an instant of the rigid motion the forces
--(M a + h) of inertia, loads and motors are in balance. They deflect the mechanism, undeformed in its nominal pose, by
-
-    (K + e M) x + Phi_q^T mu = f,    Phi_q x = 0
-
-with a multiple e of the mass that is small against the stiffness: among solutions that differ by free motions, x is the
-one without momentum. A force at the end-effector is balanced by the inertia of the free motion that it causes (inertia
-relief).
-
-Bodies also vibrate. Each x is complemented by the deflection y under its own inertia, with M x in place of f, times x^T
-K x / x^T M x: load-dependent Ritz vectors (Wilson, Yuan and Dickens 1982, Earthquake Eng. Struct. Dyn. 10, 813-821),
-which tend to the lowest modes that the forces excite.
+Of a planned motion no run is needed: see `planned`. Its deflections are weighted such that the shares of the directions
+left out, summed up, estimate what the end-effector's position misses.
 """
 
-from collections.abc import Iterable, Sequence
+from __future__ import annotations
+
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
-import scipy
 
 from paraflex.arguments import checked_arguments
 from paraflex.arrays import Array
-from paraflex.dynamics import State, System, acting_loads, dependence, joint_coordinate
-from paraflex.dynamics.linearise import typical_square
-from paraflex.dynamics.points import marker_place
-from paraflex.dynamics.sparse import Saddle, elastic_stiffness, sparse_jacobian, sparse_mass, stiffness_diagonal
+from paraflex.dynamics import State, System, dependence
+from paraflex.dynamics.sparse import stiffness_diagonal
 from paraflex.errors import ActuationError, InputError, SingularActuationError
-from paraflex.kernel.bodies import motion_forces
-from paraflex.kernel.packed import make_scratch
 from paraflex.mechanism import ActuationMode, Mechanism, mode_of_motors
 from paraflex.motion import MotionRun
-from paraflex.tracking import TrackingRun, TrackingTask, undeformed_at
-
-# Number of instants of the motion along the path.
-_INSTANTS = 12
-# Multiple of the mass, relative to the squared lowest frequency of any body: its relative effect on a deflection.
-_FREE = 1e-6
-
-
-class PlannedDeflections:
-    """Static deflections (k, n) of bodies at instants of a task's planned motion.
-
-    Attributes
-    ----------
-    samples : list of int
-        Numbers of the instants among the task's sample times.
-    """
-
-    def __init__(self, task: TrackingTask) -> None:
-        motion = task.motion
-        self.task: TrackingTask = task
-        self.samples: list[int] = _instants(motion.t, task.path.duration)
-        self._q, self._v, self._a = undeformed_at(task.system, motion, self.samples)
-        self._structures = [_Structure(task.system, pose) for pose in self._q]
-
-    def of_mode(self, mode: ActuationMode) -> Array:
-        """Return deflections (2 instants, n) by a mode's torques, inertia and loads, then by their own inertia.
-
-        Raises
-        ------
-        ActuationError, SingularActuationError
-            The mode cannot drive the mechanism along the path.
-        """
-        system, times = self.task.system, self.task.motion.t[self.samples]
-        torques, forces = self.task.torques(mode).evaluate(times), np.zeros_like(self._q)
-        loads, scratch = acting_loads(system.mechanism, times), make_scratch(system.packed)
-        motion_forces(system.packed, self._q, self._v, self._a, loads, forces, scratch)
-        for motor, torque in zip(system.mechanism.motors, torques.T, strict=True):
-            forces -= torque[:, None] * joint_coordinate(system, motor.joint, self._q).rows
-        return _ritz_vectors(zip(self._structures, -forces, strict=True))
-
-    def of_end_effector(self) -> Array:
-        """Return deflections (4 instants, n) by unit end-effector forces along x and y, then by their own inertia.
-
-        They deflect bodies in proportion to the effect of these deflections on the end-effector's position.
-        """
-        system = self.task.system
-        effector = system.mechanism.end_effector
-        assert effector is not None
-        rows = marker_place(system, system.marker(effector.point), self._q)[1]
-        pairs = zip(self._structures, rows, strict=True)
-        return _ritz_vectors((each, row) for each, pair in pairs for row in pair)
-
-
-def _instants(t: Array, end: float) -> list[int]:
-    """Return samples evenly spaced within the motion along the path, without its ends."""
-    last = int(np.searchsorted(t, end, side="right")) - 1
-    return np.unique(np.linspace(0, last, _INSTANTS + 2).astype(int)[1:-1]).tolist()
-
-
-class _Structure:
-    """Factorised equations of a pose."""
-
-    def __init__(self, system: System, q: Array) -> None:
-        self.mass = sparse_mass(system, q)
-        stiffness = elastic_stiffness(system, q, every_spring=True)
-        self.elastic = stiffness_diagonal(system)
-        self._little = _FREE * typical_square(self.elastic, stiffness, self.mass) * self.mass
-        self._saddle = Saddle(scipy.sparse.csr_matrix(stiffness + self._little), sparse_jacobian(system, q))
-
-    def static_displacements(self, force: Array) -> Array:
-        """Return static displacements (n,) under forces (n,) that the inertia of free motions balances."""
-        # Under unbalanced forces nearly all of this is free motion, whose inertia holds the mechanism in place.
-        moved = self._saddle.solve(force)[0]
-        return self._saddle.solve(force - self._little @ moved)[0]
-
-
-def _ritz_vectors(loaded: Iterable[tuple[_Structure, Array]]) -> Array:
-    """Return static displacements under forces, then under their own inertia, scaled to the same size (2 k, n)."""
-    first, second = [], []
-    for structure, force in loaded:
-        x = structure.static_displacements(force)
-        inertia = structure.mass @ x
-        moving = x @ inertia
-        first.append(x)
-        second.append(
-            (x**2 @ structure.elastic / moving if moving > 0.0 else 0.0) * structure.static_displacements(inertia)
-        )
-    return np.array(first + second)
-
+from paraflex.tracking import TrackingRun, TrackingTask
+from .planned import Loading, Owed, PlannedDeflections
 
 # Directions with less than this fraction of the largest root of energy are rounding.
 _ROUNDING = 1e-10
+# Decompositions, each with weights that follow from the one before.
+_PASSES = 3
+# In place of the number of coordinates: as few as the tolerance allows.
+AUTO = "auto"
+# Number of coordinates kept if neither it nor a deviation is given.
+_COORDINATES = 16
 
 
 @checked_arguments()
 def reduced_mechanism(
     along: TrackingTask | TrackingRun | MotionRun | Sequence[TrackingRun | MotionRun],
-    coordinates: int = 16,
+    coordinates: int | None = None,
     *,
     modes: Sequence[str | ActuationMode] | None = None,
+    deviation: float | None = None,
 ) -> Mechanism:
     """Return the mechanism with few flexible coordinates in total; equations, joints and geometry are unchanged.
 
     The kept shapes are those with the most strain energy: in static deflections under inertia, loads and torques of a
     planned motion, so that no run is needed; or in runs (proper orthogonal decomposition). Deflections under forces at
-    the end-effector have the same weight, as they show what moves it. A body that hardly deflects keeps no shapes. The
+    the end-effector have the same weight, as they show what moves it. With a deviation they are those without which the
+    planned motion would deviate most, see `planned_reduction`. A body that hardly deflects keeps no shapes. The
     mechanism suits motions like the given one: `TrackingTask.remodelled` applies the plan to it, `simulate_motion`
     accepts it.
 
@@ -149,11 +57,14 @@ def reduced_mechanism(
     ----------
     along : TrackingTask, or one or several runs
         Planned motion, or runs of one mechanism, for which the reduction is chosen.
-    coordinates : int
-        Number of flexible coordinates kept, over all bodies together.
+    coordinates : int, optional
+        Number of flexible coordinates kept, over all bodies together; 16 if no deviation is given either.
     modes : sequence of str or ActuationMode, optional
         Actuation modes of a plan; by default those of the mechanism, or all motors. A mode that cannot drive the
         mechanism along the path is left out, unless no mode can.
+    deviation : float, optional
+        Estimated deviation of the end-effector, along a plan, from its positions with all coordinates [m]: as few
+        coordinates are kept as it allows. A mechanism of rigid bodies is returned unchanged.
 
     Returns
     -------
@@ -164,30 +75,47 @@ def reduced_mechanism(
     ------
     InputError
         All bodies are rigid; the number of coordinates is out of range or above the number of directions in the motion;
-        runs are of several mechanisms; or modes are given with runs.
+        runs are of several mechanisms; modes or a deviation are given with runs; or both a number and a deviation.
     ActuationError, SingularActuationError
         No mode can drive the mechanism along the path.
     """
+    count = _COORDINATES if coordinates is None else coordinates
     if isinstance(along, TrackingTask):
-        return _along_plan(along, coordinates, modes)
+        if deviation is None:
+            return _along_plan(along, count, modes)
+        if coordinates is not None:
+            raise InputError("determines the number of coordinates", field="deviation", value=deviation,
+                             remedy="give one of both")  # fmt: skip
+        return planned_reduction(along, deviation, modes=modes).mechanism
     if modes is not None:
         raise InputError("are those of the runs", field="modes", value=modes, remedy="leave them out")
-    return _from_runs([along] if isinstance(along, TrackingRun | MotionRun) else list(along), coordinates)
+    if deviation is not None:
+        raise InputError("is estimated for a plan, not for runs", field="deviation", value=deviation,
+                         remedy="leave it out, or give the task")  # fmt: skip
+    return _from_runs([along] if isinstance(along, TrackingRun | MotionRun) else list(along), count)
 
 
 def _along_plan(task: TrackingTask, count: int, modes: Sequence[str | ActuationMode] | None) -> Mechanism:
-    mechanism, planned = task.mechanism, PlannedDeflections(task)
+    _check_flexible(task.system)
+    planned = PlannedDeflections(task)
+    driven = [planned.with_inertia(planned.under(loading)) for loading in _loadings(planned, modes)]
+    groups = [_normalised(task.system, driven), planned.with_inertia(planned.of_end_effector())]
+    return _with_directions(task.system, groups, count)
+
+
+def _loadings(planned: PlannedDeflections, modes: Sequence[str | ActuationMode] | None) -> list[Loading]:
+    """Return the loadings of the modes that can drive the mechanism along the path, at least of one."""
+    mechanism = planned.task.mechanism
     chosen = modes or mechanism.modes or [mode_of_motors(mechanism, [motor.name for motor in mechanism.motors])]
     driven, refused = [], None
     for mode in chosen:
         try:
-            driven.append(planned.of_mode(task.mode(mode)))
+            driven.append(planned.loading(planned.task.mode(mode)))
         except (ActuationError, SingularActuationError) as error:
             refused = error
     if refused is not None and not driven:
         raise refused
-    groups = [normalised_by_energy(task.system, driven), planned.of_end_effector()]
-    return replace(mechanism, bases=bases_of(task.system, groups, count))
+    return driven
 
 
 def _from_runs(runs: Sequence[TrackingRun | MotionRun], count: int) -> Mechanism:
@@ -195,59 +123,173 @@ def _from_runs(runs: Sequence[TrackingRun | MotionRun], count: int) -> Mechanism
     systems = [run.task.system if isinstance(run, TrackingRun) else run.system for run in runs]
     if not systems or any(system.mechanism != systems[0].mechanism for system in systems):
         raise InputError("are not of one mechanism", field="along", remedy="give one or several runs of one")
-    groups = [normalised_by_energy(systems[0], [run.solution.q for run in runs])]
-    groups += [PlannedDeflections(run.task).of_end_effector() for run in runs[:1] if isinstance(run, TrackingRun)]
-    return replace(systems[0].described, bases=bases_of(systems[0], groups, count))
+    _check_flexible(systems[0])
+    groups = [_normalised(systems[0], [run.solution.q for run in runs])]
+    for run in runs[:1]:
+        if isinstance(run, TrackingRun):
+            planned = PlannedDeflections(run.task)
+            groups.append(planned.with_inertia(planned.of_end_effector()))
+    return _with_directions(systems[0], groups, count)
 
 
-def bases_of(system: System, deflections: Sequence[Array], count: int) -> dict[str, tuple[tuple[float, ...], ...]]:
-    """Return reduced flexible coordinates (own, kept) of every flexible body, in those of its reference condition.
+def _with_directions(system: System, groups: Sequence[Array], count: int) -> Mechanism:
+    """Return the mechanism with the directions of most energy in groups of deflections of equal weight."""
+    found = _directions(system, _normalised(system, groups))
+    return replace(system.described, bases=_bases(system, found[: _checked_count(system, found, count)]))
+
+
+def reduced_task(
+    task: TrackingTask, reduced: int | str, tolerance: float, modes: Sequence[str | ActuationMode] | None
+) -> tuple[TrackingTask, Reduction | None]:
+    """Return the task with a number of coordinates, or with `AUTO` as few as a tolerance allows [m], estimated."""
+    if reduced != AUTO:
+        return task.remodelled(reduced_mechanism(task, int(reduced), modes=modes)), None
+    reduction = planned_reduction(task, tolerance, modes=modes)
+    return task.remodelled(reduction.mechanism), reduction
+
+
+class Reduction(NamedTuple):
+    """Mechanism with few flexible coordinates for a planned motion.
+
+    Attributes
+    ----------
+    mechanism : Mechanism
+        Reduced mechanism.
+    full : TrackingTask
+        Task with all flexible coordinates.
+    deviation : float
+        Estimated deviation of the end-effector from its positions with all coordinates [m].
+    energy : float
+        Largest strain energy of static deflections along the plan [J], which the estimate assumes.
+    """
+
+    mechanism: Mechanism
+    full: TrackingTask
+    deviation: float
+    energy: float
+
+
+@checked_arguments()
+def planned_reduction(
+    task: TrackingTask, deviation: float, *, modes: Sequence[str | ActuationMode] | None = None
+) -> Reduction:
+    """Return the reduction of a plan's mechanism to as few coordinates as an estimated deviation allows.
 
     Parameters
     ----------
-    system : System
-        System with all flexible coordinates.
-    deflections : sequence of (k, n) arrays
-        Coordinates of the system; all arrays have equal weight by their strain energy.
-    count : int
-        Number of coordinates kept, over all bodies together.
-
-    Raises
-    ------
-    InputError
-        The count exceeds the number of flexible coordinates, or of independent directions in the deflections.
+    task, deviation, modes
+        See `reduced_mechanism`, also for the errors.
     """
-    if not system.n_flexible:
-        raise InputError("has rigid bodies only", field="mechanism", value=system.mechanism.name,
-                         remedy="give it flexible ones")  # fmt: skip
+    if not (np.isfinite(deviation) and deviation > 0.0):
+        raise InputError("is not a positive length", field="deviation", value=deviation,
+                         remedy="give a length in metres, say 1e-5")  # fmt: skip
+    if not task.system.n_flexible:
+        return Reduction(task.mechanism, task, 0.0, 0.0)
+    planned = PlannedDeflections(task)
+    driven = _loadings(planned, modes)
+    found, left = _least_missed(task.system, [planned.owed(each) for each in driven], deviation)
+    energies = [planned.under(loading) ** 2 @ stiffness_diagonal(task.system) / 2.0 for loading in driven]
+    mechanism = replace(task.mechanism, bases=_bases(task.system, found))
+    return Reduction(mechanism, task, left, float(np.max(energies)))
+
+
+def _least_missed(system: System, modes: Sequence[Owed], deviation: float) -> tuple[list[_Direction], float]:
+    """Return the fewest directions with an estimated deviation in all modes, and their largest one [m].
+
+    What a deflection misses counts with its slope up to its cap: shapes for a vibration that is not kept in phase in
+    any case are better spent on others. The weights of the decomposition follow from the directions kept before.
+    """
+    owed = Owed(*(np.concatenate(parts) for parts in zip(*modes, strict=True)))
+    begins = np.cumsum([0, *(one.slopes.size for one in modes[:-1])])
+    weights, kept, left = owed.slopes, [], 0.0
+    for _ in range(_PASSES):
+        found = _directions(system, np.sqrt(weights)[:, None] * owed.deflections)
+        roots = np.array([owed.deflections[:, one.coordinates] @ one.energies for one in found]).T
+        parts = np.cumsum(np.column_stack([np.zeros(len(roots)), roots**2]), axis=1)
+        parts = np.maximum(0.0, parts[:, -1:] - parts)
+        each = np.add.reduceat(np.minimum(owed.slopes[:, None] * parts, owed.caps[:, None]), begins, axis=0)
+        missed = np.max(each, axis=0)
+        kept = found[: min(max(1, int(np.argmax(missed <= deviation))), _independent(found))]
+        left = float(missed[len(kept)])
+        weights = np.minimum(owed.slopes, owed.caps / np.maximum(parts[:, len(kept)], np.finfo(float).tiny))
+    return kept, left
+
+
+class _Direction(NamedTuple):
+    """Direction of deflections of a body.
+
+    Attributes
+    ----------
+    size : float
+        Root of the energy of deflections in this direction.
+    body : str
+        Name of the body.
+    coordinates : slice
+        Its flexible coordinates u in the system.
+    energies : array
+        Product with u that gives the root of energy of a deflection in this direction.
+    shape : array
+        Direction in the coordinates of the body's reference condition.
+    """
+
+    size: float
+    body: str
+    coordinates: slice
+    energies: Array
+    shape: Array
+
+
+def _directions(system: System, deflections: Array) -> list[_Direction]:
+    """Return the directions of deflections (k, n) of each body, by decreasing size."""
+    found = []
+    for body in system.bodies:
+        omega = body.modes.omega
+        directions, sizes, _ = np.linalg.svd((omega * deflections[:, body.flexible]).T, full_matrices=False)
+        shapes = body.modes.vectors @ (directions / omega[:, None])
+        found += [
+            _Direction(size, body.name, body.flexible, omega * directions[:, k], shapes[:, k])
+            for k, size in enumerate(sizes.tolist())
+        ]
+    # Equal directions keep the order of their bodies.
+    return sorted(found, key=lambda one: -one.size)
+
+
+def _checked_count(system: System, found: Sequence[_Direction], count: int) -> int:
+    """Return a number of coordinates to keep, checked against those of the system and the independent directions."""
     if not 1 <= count <= system.n_flexible:
         raise InputError(
             "no such number of flexible coordinates", field="coordinates", value=count,
             remedy=f"from 1 to {system.n_flexible}",
         )  # fmt: skip
-    together = normalised_by_energy(system, deflections)
-    found = []
-    for body in system.bodies:
-        energies = body.modes.omega * together[:, body.flexible]
-        directions, sizes, _ = np.linalg.svd(energies.T, full_matrices=False)
-        shapes = body.modes.vectors @ (directions / body.modes.omega[:, None])
-        found += [(size, body.name, shapes[:, k]) for k, size in enumerate(sizes.tolist())]
-    # Equal directions keep the order of their bodies.
-    kept = sorted(found, key=lambda one: -one[0])[:count]
-    if not kept or kept[-1][0] <= _ROUNDING * kept[0][0]:
-        known = sum(size > _ROUNDING * kept[0][0] for size, _, _ in found) if kept else 0
+    known = _independent(found)
+    if count > known:
         raise InputError(
             f"are more than the {known} directions in which the motion bends the bodies", field="coordinates",
             value=count, remedy=f"keep at most {known}" if known else "it does not bend them at all",
         )  # fmt: skip
+    return count
+
+
+def _independent(found: Sequence[_Direction]) -> int:
+    return sum(one.size > _ROUNDING * found[0].size for one in found)
+
+
+def _bases(system: System, kept: Sequence[_Direction]) -> dict[str, tuple[tuple[float, ...], ...]]:
+    """Return directions as reduced coordinates (own, kept) of every body, in those of its reference condition."""
     return {
-        body.name: _rows([shape for _, name, shape in kept if name == body.name], len(body.modes.vectors))
+        body.name: _rows([one.shape for one in kept if one.body == body.name], len(body.modes.vectors))
         for body in system.bodies
         if body.nf
     }
 
 
-def normalised_by_energy(system: System, parts: Sequence[Array]) -> Array:
+def _check_flexible(system: System) -> None:
+    if not system.n_flexible:
+        raise InputError("has rigid bodies only", field="mechanism", value=system.mechanism.name,
+                         remedy="give it flexible ones")  # fmt: skip
+
+
+def _normalised(system: System, parts: Sequence[Array]) -> Array:
     """Scale deflections (k, n) to one unit of strain energy in total, with equal shares of each part (any, n)."""
     stiffness = stiffness_diagonal(system)
     energies = [np.sum(part**2 @ stiffness) for part in parts]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -18,14 +18,16 @@ if TYPE_CHECKING:
     # The module imports the kernels, which are not needed to read results.
     from paraflex.reduced_bodies import Size
 
-# Variable that identifies such a dataset, and prefix of the numbers of the full runs.
-DISTANCE, FULL = "reduction_distance", "full_"
+# Variables that identify such a dataset, and prefix of the numbers of the full runs.
+DISTANCE, ESTIMATE, FULL = "reduction_distance", "reduction_estimate", "full_"
 # Attributes with the sizes of the reduced system and, with the prefix, of the full system.
 COUNTS = ("flexible_coordinates", "states")
 # Variables of full runs that are kept: tracking errors along a path, and the cost of the runs.
 _NUMBERS = (*HEADLINE.values(), "wall_time", "steps")
 # A distance above this fraction of the full run's tracking error or largest deflection is a finding.
 _FAR = 0.1
+# A strain energy above this multiple of that of planned static deflections is a finding: three times their amplitude.
+_BEYOND = 9.0
 
 
 def compared_with_full(data: xr.Dataset, full: xr.Dataset, kept: Size, whole: Size) -> xr.Dataset:
@@ -52,9 +54,49 @@ def compared_with_full(data: xr.Dataset, full: xr.Dataset, kept: Size, whole: Si
             number = full[name].reindex_like(data[name])
             meaning = f"{data[name].attrs.get('long_name', name)}, all flexible coordinates"
             added[f"{FULL}{name}"] = number.assign_attrs(data[name].attrs | {"long_name": meaning})
-    out = data.assign(added)
-    out.attrs |= kept._asdict() | {f"{FULL}{name}": count for name, count in whole._asdict().items()}
+    out = data.assign(added).assign_attrs(_counts(kept, whole))
     keep_findings(out, [*verdict_of(data), *_distant_runs(out, full)])
+    return out
+
+
+def _counts(kept: Size, whole: Size) -> dict[str, int]:
+    return kept._asdict() | {f"{FULL}{name}": count for name, count in whole._asdict().items()}
+
+
+def with_estimate(
+    data: xr.Dataset, deviation: float, energies: Mapping[str, float], planned: float, kept: Size, whole: Size
+) -> xr.Dataset:
+    """Return the dataset of reduced runs along a path with the estimated deviation of the end-effector.
+
+    Parameters
+    ----------
+    data : xarray.Dataset
+        Results of the runs.
+    deviation : float
+        Estimated deviation from the positions with all coordinates [m].
+    energies : mapping of str to float
+        Largest strain energy of each mode's run [J].
+    planned : float
+        Largest strain energy of the planned static deflections, for which the shapes are chosen [J]. A run with far
+        more of it is a finding.
+    kept, whole : Size
+        Sizes of the reduced and of the full system.
+    """
+    meaning = "estimated deviation of the end-effector from its place with all flexible coordinates"
+    out = data.assign({ESTIMATE: xr.DataArray(deviation, attrs={"long_name": meaning, "units": "m"})})
+    out = out.assign_attrs(_counts(kept, whole))
+    beyond = [
+        Finding(
+            "reduced-beyond-plan",
+            f"{MODE}{mode}",
+            f"beams store up to {quantity(energy, 'J', digits=2)}, and {quantity(planned, 'J', digits=2)} in the "
+            "planned deflections for which their shapes are chosen: more may be missing than estimated",
+            "keep all flexible coordinates, or compare with --reduced N",
+        )
+        for mode, energy in energies.items()
+        if energy > _BEYOND * planned
+    ]
+    keep_findings(out, [*verdict_of(out), *beyond])
     return out
 
 
@@ -77,12 +119,14 @@ def _distant_runs(data: xr.Dataset, full: xr.Dataset) -> Iterator[Finding]:
 
 
 def reduced_run_figures(data: xr.Dataset) -> dict[str, Any]:
-    """Return `reduction` of the single run of a dataset, with its distance to the full run and numbers of the latter.
+    """Return `reduction` of the single run of a dataset: its estimated deviation, and distance to a full run.
 
     The dictionary is empty if the run has all flexible coordinates.
     """
-    if DISTANCE not in data:
+    if DISTANCE not in data and ESTIMATE not in data:
         return {}
-    numbers = {name: finite_or_none(data[name].item()) for name in data if str(name).startswith(FULL)}
+    known = {"estimate": ESTIMATE, "distance": DISTANCE}
+    known |= {str(name): str(name) for name in data if str(name).startswith(FULL)}
+    numbers = {key: finite_or_none(data[name].item()) for key, name in known.items() if name in data}
     counts = {name: int(data.attrs[name]) for each in COUNTS for name in (each, FULL + each)}
-    return {"reduction": {"distance": finite_or_none(data[DISTANCE].item()), **numbers, **counts}}
+    return {"reduction": numbers | counts}

@@ -19,7 +19,7 @@ from paraflex.errors import InputError
 from paraflex.files import Model, load
 from paraflex.integrators import IntegrationOptions
 from paraflex.mechanism import ActuationMode
-from paraflex.reduced_bodies import reduced_mechanism
+from paraflex.reduced_bodies import reduced_task
 from paraflex.results.following import HEADLINE, ErrorSpan
 from paraflex.results.labelled import provenance
 from paraflex.results.metrics import METRICS
@@ -176,14 +176,15 @@ def laws_of(model: Model, names: Sequence[str] = ()) -> dict[str, tuple[Controll
 
 
 def reduced_tasks(
-    model: Model, tasks: Mapping[str, TrackingTask], modes: Sequence[str | ActuationMode]
+    model: Model, tasks: Mapping[str, TrackingTask], modes: Sequence[str | ActuationMode], options: IntegrationOptions
 ) -> dict[str, TrackingTask]:
     """Return the tasks with reduced bodies if the model's study asks for a reduction, else the tasks unchanged."""
     if not model.study.reduced:
         return dict(tasks)
     # One reduced mechanism serves all paths, so that their results do not differ by the reduction.
-    mechanism = reduced_mechanism(next(iter(tasks.values())), model.study.reduced, modes=modes)
-    return {name: task.remodelled(mechanism) for name, task in tasks.items()}
+    first = next(iter(tasks.values()))
+    few, _ = reduced_task(first, model.study.reduced, options.tolerance_for(first.system), modes)
+    return {name: task.remodelled(few.mechanism) for name, task in tasks.items()}
 
 
 @checked_arguments(model="give a model, or the name or file of one")
@@ -244,8 +245,9 @@ def compare_laws(
         model.path_name(name): model.plan(name, duration=duration, samples=samples, assembly=assembly, warning=False)
         for name in paths or (None,)
     }
+    options = options or model.study.integration()
     study = LawStudy(
-        reduced_tasks(model, tasks, found), chosen, found, options or model.study.integration(), metrics,
+        reduced_tasks(model, tasks, found, options), chosen, found, options, metrics,
         ErrorSpan(model.study.error), {"model": dict(model.parameters)},
     )  # fmt: skip
     return study.run(workers=Workers(number=workers), on_progress=on_progress)

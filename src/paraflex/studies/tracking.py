@@ -9,21 +9,23 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Any, ClassVar, Protocol
 
+import numpy as np
 import xarray as xr
 
 from paraflex.arguments import CheckedFields, checked_arguments, refused
 from paraflex.campaign import THREADS, OnProgress, Progress, Result, WholeStudy, Workers
 from paraflex.campaign.workers import Calls
 from paraflex.control import ControllerDescription, simulate_controlled
+from paraflex.dynamics.sparse import stiffness_diagonal
 from paraflex.errors import ControllerError, InputError, IntegrationError, NumericalError
 from paraflex.findings import Finding
 from paraflex.folders import RUN
 from paraflex.integrators import IntegrationOptions
 from paraflex.mechanism import ActuationMode
-from paraflex.reduced_bodies import size_of
+from paraflex.reduced_bodies import Reduction, size_of
 from paraflex.results import summary, tracking_dataset
 from paraflex.results.following import ErrorSpan
-from paraflex.results.reduced_runs import compared_with_full
+from paraflex.results.reduced_runs import compared_with_full, with_estimate
 from paraflex.tracking import TrackingRun, TrackingTask, simulate
 
 
@@ -111,6 +113,9 @@ class TrackingStudy(WholeStudy[StudyResult], CheckedFields):
         the results contain the deviation of the reduced run from it.
     controllers : sequence of ControllerDescription
         Controllers that act in every mode in addition to the planned torques.
+    reduction : Reduction, optional
+        Reduction by which the bodies of `task` are reduced, from `planned_reduction`; its estimated deviation is stored
+        with the results.
 
     Raises
     ------
@@ -130,6 +135,7 @@ class TrackingStudy(WholeStudy[StudyResult], CheckedFields):
     findings: Iterable[Finding] = ()
     full: TrackingTask | None = None
     controllers: Sequence[ControllerDescription] = ()
+    reduction: Reduction | None = None
 
     def _prepare(self, workers: Workers | None) -> Callable[[OnProgress | None], StudyResult]:
         if self.method is not None and not callable(self.method):
@@ -211,7 +217,16 @@ class TrackingStudy(WholeStudy[StudyResult], CheckedFields):
         if data is not None and self.full is not None and whole:
             sizes = [size_of(task.system, task.start) for task in (self.task, self.full)]
             data = compared_with_full(data, tracking_dataset(whole, options=self.options), *sizes)
+        if data is not None and self.reduction is not None:
+            sizes = [size_of(task.system, task.start) for task in (self.task, self.reduction.full)]
+            energies = {run.mode.name: _largest_energy(run) for run in runs}
+            data = with_estimate(data, self.reduction.deviation, energies, self.reduction.energy, *sizes)
         return StudyResult(data, failed, interrupted)
+
+
+def _largest_energy(run: TrackingRun) -> float:
+    """Return the largest strain energy of a run's beams [J]."""
+    return float(np.max(run.solution.q**2 @ stiffness_diagonal(run.task.system), initial=0.0)) / 2.0
 
 
 @checked_arguments()

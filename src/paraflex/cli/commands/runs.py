@@ -62,10 +62,10 @@ class RunRequest:
     rigid: bool = switch("--rigid", "Treat all bodies as rigid.")
     geometry: str | None = option("--geometry second-order|linear", "Shape of the beams. Default: the model's.")
     frames: FramesChoice = field(default_factory=FramesChoice)
-    reduced: int | None = option(
-        "--reduced N",
-        "Keep N flexible coordinates of all bodies together, and report the error. Default: the study's, else all; "
-        "0 for all.",
+    reduced: str | None = option(
+        "--reduced N|auto",
+        "Keep N flexible coordinates of all bodies together and report the error, or as few as the tolerance allows. "
+        "Default: the study's, else all; 0 for all.",
     )
     segments: int | None = option("--segments N", "Cut beams into finite segments, N for the longest (the paper's: 8).")
     ked: bool = switch("--ked", "Kineto-elastodynamics: active motors held on the rigid motion.")
