@@ -324,3 +324,152 @@ def test_a_sweep_of_a_motion_without_a_path_cannot_choose(tmp_path):
     )
     with pytest.raises(InputError, match=r"study\.reduced: few flexible coordinates are chosen from a planned path"):
         pf.sweep(tmp_path / "sweep.toml", tmp_path / "out")
+
+
+# --- As few coordinates as the tolerance allows -----------------------------------------------------------------------
+
+# Of every mechanism of the library with flexible links and a path.
+LIBRARY = (
+    ("raparm_i", "square", "+-+-"), ("raparm_i", "square", "-+-+"), ("raparm_i", "square", "++++"),
+    ("raparm_i", "line", "++-+"), ("raparm_ii", "square", "+--+"), ("raparm_ii", "line", "-+++"),
+    ("3rrr", "square", "++++++"), ("3rrr", "circle", "++-+--"), ("4rrr", "square", "++-+"), ("4rrr", "circle", "++++"),
+    ("five_bar", "square", "++"), ("five_bar", "line", "++"), ("3prr", "circle", "+++"),
+    ("geared_five_bar", "stroke", "+-"),
+)  # fmt: skip
+
+
+@pytest.mark.parametrize(("name", "path", "mode"), LIBRARY)
+def test_as_few_coordinates_as_the_tolerance_allows(name, path, mode):
+    """At most three tolerances are asked for; all modes are in `benchmarks/reduced_runs.py`."""
+    model = pf.load(name)
+    mechanism = model.mechanism.with_geometry("second-order")
+    task = pf.plan(mechanism, model.paths[path], duration=model.study.duration)
+    tolerance = model.study.integration().tolerance_for(task.system)
+    chosen = pf.planned_reduction(task, tolerance, modes=[mode])
+    few = task.remodelled(chosen.mechanism)
+    assert chosen.deviation <= tolerance
+    assert few.system.n_flexible < 0.4 * task.system.n_flexible
+    options = pf.IntegrationOptions(method="esdirk5", tolerance=tolerance / 10.0)
+    runs = [pf.tracking_dataset([each.simulate(mode, options=options, warning=False)]) for each in (few, task)]
+    apart = np.linalg.norm(runs[0]["end_effector"].values - runs[1]["end_effector"].values, axis=-1)
+    assert np.max(apart) < 3.0 * tolerance
+
+
+def test_the_estimated_deviation_falls_with_the_coordinates_that_it_asks_for(task):
+    found = [pf.planned_reduction(task, deviation, modes=["++++"]) for deviation in (1e-3, 1e-4, 1e-5, 1e-6)]
+    counts = [build_system(one.mechanism).n_flexible for one in found]
+    assert counts == sorted(set(counts))
+    assert all(one.deviation <= deviation for one, deviation in zip(found, (1e-3, 1e-4, 1e-5, 1e-6), strict=True))
+    # Of several modes the worst counts.
+    both = pf.planned_reduction(task, 1e-4, modes=["++++", "-+-+"])
+    assert build_system(both.mechanism).n_flexible >= counts[1]
+    assert pf.reduced_mechanism(task, modes=["++++"], deviation=1e-4) == found[1].mechanism
+
+
+def test_large_mechanisms_are_estimated_without_all_their_vibrations(task, monkeypatch):
+    """By factors of sparse matrices, and combinations of deflections for the vibrations that loads excite."""
+    whole = PlannedDeflections(task)
+    monkeypatch.setattr("paraflex.reduced_bodies.planned.DENSE_COORDINATES", 0)
+    sparse = PlannedDeflections(task)
+    loading = whole.loading(task.mode("++++"))
+    for found, expected in (
+        (sparse.under(loading), whole.under(loading)),
+        (sparse.of_end_effector(), whole.of_end_effector()),
+    ):
+        np.testing.assert_allclose(found, expected, atol=3e-5 * np.abs(expected).max())
+    rows = whole._rows[2]
+    exact, near = (one._structures[2] for one in (whole, sparse))
+    free = exact.free_displacements(rows)
+    np.testing.assert_allclose(near.free_displacements(rows), free, atol=1e-4 * np.abs(free).max())
+    statics = near.static_displacements(np.concatenate([loading.forces[whole.samples[2]][None], rows]))
+    lowest = near.vibrations(statics)[1]
+    assert sorted(lowest)[:2] == pytest.approx(sorted(exact.vibrations(statics)[1])[:2], rel=1e-3)
+    # The estimate has fewer vibrations to count.
+    estimates = [pf.planned_reduction(task, 1e-4, modes=["++++"]), None]
+    monkeypatch.undo()
+    estimates[1] = pf.planned_reduction(task, 1e-4, modes=["++++"])
+    counts = [build_system(one.mechanism).n_flexible for one in estimates]
+    assert abs(counts[0] - counts[1]) <= 6
+
+
+def test_vibrations_of_a_spring_that_a_force_begins():
+    """A ramp that stops: two kinks, whose vibrations add up or cancel; a step: a vibration as large as itself."""
+    from paraflex.reduced_bodies.planned import _vibrating
+
+    omega, t = np.array([10.0, 20.0]), np.linspace(0.0, 2.0 * np.pi / 10.0, 201)
+    ramp = np.minimum(t / (np.pi / 10.0), 1.0)
+    slope = 10.0 / np.pi
+    found = _vibrating(t, np.column_stack([ramp, ramp]), omega)
+    # Half a period of the first: the second kink doubles its vibration. A whole period of the second.
+    assert found == pytest.approx([2.0 * slope / 10.0, slope / 20.0], rel=1e-6)
+    assert _vibrating(t, np.ones((201, 2)), omega) == pytest.approx([1.0, 1.0])
+
+
+def test_the_command_keeps_as_few_as_the_tolerance_allows(tmp_path):
+    done = paraflex("run", "--no-figures", "five_bar", "--reduced", "auto", "--out", "r", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    data = load_results(tmp_path / "r" / "results.nc")
+    kept, deviation = data.attrs["flexible_coordinates"], data["reduction_estimate"].item()
+    assert 4 < kept < 26
+    assert 0.0 < deviation <= 1e-5
+    words = " ".join(done.stdout.split())
+    assert f"{kept} of 52 flexible coordinates" in words
+    assert "estimated deviation" in words
+    assert "largest stress" not in words
+    assert "stress" not in data
+    numbers = json.loads((tmp_path / "r" / "summary.json").read_text())["modes"]["++"]["reduction"]
+    assert numbers["estimate"] == deviation
+    assert "distance" not in numbers
+    assert "estimated deviation" in (tmp_path / "r" / "report.html").read_text()
+    # A looser tolerance needs fewer.
+    loose = paraflex("run", "--no-figures", "five_bar", "--reduced", "auto", "--tol", "1e-3", "--json", cwd=tmp_path)
+    assert json.loads(loose.stdout)["modes"]["++"]["reduction"]["flexible_coordinates"] < kept
+
+
+def test_a_run_that_bends_far_beyond_its_plan_is_a_finding():
+    model = pf.load("five_bar")
+    task = pf.plan(model, "line")
+    chosen = pf.planned_reduction(task, 1e-5)
+    few = task.remodelled(chosen.mechanism)
+    data = pf.run_study(few, ["++"], reduction=chosen, warning=False).data
+    assert "reduced-beyond-plan" not in codes(data)
+    data = pf.run_study(few, ["++"], reduction=chosen._replace(energy=chosen.energy / 100.0), warning=False).data
+    assert "reduced-beyond-plan" in codes(data)
+
+
+def test_sweeps_choose_coordinates_for_the_tolerance_of_each_design(reduced_file):
+    text = (reduced_file / "few.toml").read_text().replace("reduced = 10", 'reduced = "auto"')
+    (reduced_file / "auto.toml").write_text(text)
+    sweep = 'mechanism = "{}"\npaths = ["line"]\nmetrics = [{}]\n[vary.thickness]\n' \
+            'fields = ["section.bar.thickness"]\nvalues = [0.004, 0.006]\n'  # fmt: skip
+    errors = []
+    for name in ("auto.toml", "five_bar"):
+        file = reduced_file / f"sweep_{name}.toml"
+        file.write_text(sweep.format(name, '"tracking_rms"'), encoding="utf-8")
+        errors.append(pf.sweep(file, reduced_file / f"auto_{name}", workers=1).data["tracking_rms"].values.ravel())
+    assert errors[0] == pytest.approx(errors[1], abs=3e-5)
+    (reduced_file / "stress.toml").write_text(sweep.format("auto.toml", '"stress_max"'), encoding="utf-8")
+    with pytest.raises(InputError, match="metrics: reduced bodies have no stresses"):
+        pf.sweep(reduced_file / "stress.toml", reduced_file / "none", workers=1)
+
+
+def test_wrong_ways_to_ask_for_as_few_as_the_tolerance_allows(tmp_path, task, full):
+    assert "--reduced: no number of flexible coordinates (got 'few')" in refusal(
+        tmp_path, "run", "five_bar", "--reduced", "few"
+    )
+    assert "--reduced: has no effect with --rigid" in refusal(tmp_path, "run", "--rigid", "--reduced", "auto")
+    assert "--reduced: as few coordinates as the tolerance allows are chosen from a planned path" in refusal(
+        tmp_path, "run", "slider_crank_flexible", "--reduced", "auto"
+    )
+    for deviation in (0.0, -1e-5, np.nan, np.inf):
+        with pytest.raises(InputError, match="deviation"):
+            pf.planned_reduction(task, deviation)
+    with pytest.raises(InputError, match="deviation: determines the number of coordinates"):
+        pf.reduced_mechanism(task, 16, deviation=1e-5)
+    with pytest.raises(InputError, match="deviation: is estimated for a plan, not for runs"):
+        pf.reduced_mechanism(full, deviation=1e-5)
+    # Rigid bodies are as they are.
+    rigid = pf.load("five_bar").mechanism.rigid()
+    assert pf.planned_reduction(pf.plan(rigid, pf.load("five_bar").paths["line"]), 1e-5).mechanism is rigid
+    # Nothing finer than all independent shapes.
+    assert build_system(pf.planned_reduction(task, 1e-300, modes=["++++"]).mechanism).n_flexible <= 90

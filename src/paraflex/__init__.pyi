@@ -99,7 +99,11 @@ from .linear import (
     ReducedModel as ReducedModel,
     states_needed as states_needed,
 )
-from .reduced_bodies import reduced_mechanism as reduced_mechanism
+from .reduced_bodies import (
+    Reduction as Reduction,
+    planned_reduction as planned_reduction,
+    reduced_mechanism as reduced_mechanism,
+)
 
 # Statics
 from .equilibria import statics as statics, Statics as Statics
