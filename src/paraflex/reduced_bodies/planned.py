@@ -20,8 +20,8 @@ duration, L the length of the path, m an effective mass of the free motion at th
 - Phase of vibrations: a frequency is too high by at most its eta / 2 (Rayleigh's quotient). A vibration by which a unit
   force deflects the end-effector by c swings by c p, with the amplitude p of vibration in the response to the forces.
   After T its phase is wrong by omega T eta / 2, which displaces the end-effector by two swings at most.
-- Energy of vibrations: it follows their frequency (an adiabatic invariant) at the expense of the free motion. A change
-  by eta of the energy U = p^2 / 2 moves the end-effector by T^2 U eta / (m L) at most.
+- Energy of vibrations: it follows their frequency (an adiabatic invariant) at the expense of the free motion. An error
+  U eta / 2 of the energy U = p^2 / 2 moves the end-effector by T^2 U eta / (2 m L) at most.
 
 The constants are estimates, not bounds: `benchmarks/reduced_runs.py` compares them with runs.
 """
