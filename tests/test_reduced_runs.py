@@ -331,7 +331,7 @@ def test_a_sweep_of_a_motion_without_a_path_cannot_choose(tmp_path):
 # Of every mechanism of the library with flexible links and a path.
 LIBRARY = (
     ("raparm_i", "square", "+-+-"), ("raparm_i", "square", "-+-+"), ("raparm_i", "square", "++++"),
-    ("raparm_i", "line", "++-+"), ("raparm_ii", "square", "+--+"), ("raparm_ii", "line", "-+++"),
+    ("raparm_i", "line", "-+-+"), ("raparm_ii", "square", "+--+"), ("raparm_ii", "line", "-+++"),
     ("3rrr", "square", "++++++"), ("3rrr", "circle", "++-+--"), ("4rrr", "square", "++-+"), ("4rrr", "circle", "++++"),
     ("five_bar", "square", "++"), ("five_bar", "line", "++"), ("3prr", "circle", "+++"),
     ("geared_five_bar", "stroke", "+-"),
@@ -340,7 +340,7 @@ LIBRARY = (
 
 @pytest.mark.parametrize(("name", "path", "mode"), LIBRARY)
 def test_as_few_coordinates_as_the_tolerance_allows(name, path, mode):
-    """At most three tolerances are asked for; all modes are in `benchmarks/reduced_runs.py`."""
+    """Three tolerances are allowed; all modes are in `benchmarks/reduced_runs.py`."""
     model = pf.load(name)
     mechanism = model.mechanism.with_geometry("second-order")
     task = pf.plan(mechanism, model.paths[path], duration=model.study.duration)
@@ -352,7 +352,7 @@ def test_as_few_coordinates_as_the_tolerance_allows(name, path, mode):
     options = pf.IntegrationOptions(method="esdirk5", tolerance=tolerance / 10.0)
     runs = [pf.tracking_dataset([each.simulate(mode, options=options, warning=False)]) for each in (few, task)]
     apart = np.linalg.norm(runs[0]["end_effector"].values - runs[1]["end_effector"].values, axis=-1)
-    assert np.max(apart) < 3.0 * tolerance
+    assert np.max(apart) < 1.5 * tolerance
 
 
 def test_the_estimated_deviation_falls_with_the_coordinates_that_it_asks_for(task):
