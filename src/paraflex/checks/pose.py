@@ -3,6 +3,7 @@
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import product
 from math import cos, sin
 
@@ -14,6 +15,7 @@ from paraflex.dynamics import (
     DrivenFreedoms,
     Mobility,
     System,
+    Vibration,
     build_system,
     closure_of,
     driven_freedoms,
@@ -66,6 +68,15 @@ class Examination:
     mobility: Mobility | None
     reach: DrivenFreedoms | None
     problem: str = ""
+
+    @cached_property
+    def held(self) -> Vibration:
+        """Lowest vibrations about the undeformed pose of the chosen assembly, which closes, motors held."""
+        assert self.chosen is not None
+        assert self.chosen.state is not None
+        motors = list(dict.fromkeys(motor.joint for motor in self.system.mechanism.motors))
+        state = undeformed(self.system, self.rigid, self.chosen.state)
+        return natural_frequencies(self.system, state, motors, count=LOWEST)
 
 
 def examine(mechanism: Mechanism, assembly: str | None = None) -> Examination:
@@ -159,11 +170,8 @@ def _vibration(seen: Examination, at_rest: bool) -> Iterator[Finding]:
                 "frequency-low", f"body.{name}", f"its natural frequency is {slowest:.2g} Hz, too low for a link",
                 f"look at Young's modulus, section and length of {name}: Pa and m",
             )  # fmt: skip
-    mechanism = seen.system.mechanism
-    motors = list(dict.fromkeys(motor.joint for motor in mechanism.motors))
-    state = undeformed(seen.system, seen.rigid, seen.chosen.state)
     try:
-        vibration = natural_frequencies(seen.system, state, motors, count=LOWEST)
+        vibration = seen.held
     except ProportionError as error:
         yield Finding("out-of-proportion", "assembly", str(error), OUT_OF_PROPORTION)
         return
@@ -173,7 +181,7 @@ def _vibration(seen: Examination, at_rest: bool) -> Iterator[Finding]:
     # A mechanism released out of balance moves off anyway.
     holds = seen.reach.all_motors == seen.mobility.freedoms
     if growing and (holds or (at_rest and vibration.acceleration < BALANCED)):
-        held = " with the motors held" if motors else ""
+        held = " with the motors held" if seen.system.mechanism.motors else ""
         yield Finding(
             "motions-grow", "assembly",
             f"{growing} {'motion grows' if growing == 1 else 'motions grow'} about the pose{held} instead of vibrating",
