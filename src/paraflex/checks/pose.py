@@ -79,7 +79,7 @@ class Examination:
         return natural_frequencies(self.system, state, motors, count=LOWEST)
 
 
-def examine(mechanism: Mechanism, assembly: str | None = None) -> Examination:
+def examine(mechanism: Mechanism, assembly: str | None = None, system: System | None = None) -> Examination:
     """Close every assembly, and compute degrees of freedom and reach of the motors for the chosen one, or the first.
 
     Parameters
@@ -88,6 +88,8 @@ def examine(mechanism: Mechanism, assembly: str | None = None) -> Examination:
         Mechanism as described.
     assembly : str, optional
         Name of the chosen assembly; the first by default.
+    system : System, optional
+        System of the mechanism if it is known, otherwise it is built.
 
     Raises
     ------
@@ -95,7 +97,7 @@ def examine(mechanism: Mechanism, assembly: str | None = None) -> Examination:
         The assembly is unknown.
     """
     mechanism = standing(mechanism, assembly)
-    system, rigid = build_system(mechanism), build_system(mechanism.rigid())
+    system, rigid = system or build_system(mechanism), build_system(mechanism.rigid())
     starts = tuple(closure_of(_begun_at(rigid, one.name), one) for one in mechanism.assemblies)
     if not mechanism.assemblies:
         return Examination(system, rigid, starts, None, None, None)
