@@ -4,12 +4,18 @@ import os
 import shutil
 import sys
 import tempfile
+from importlib import import_module
 from pathlib import Path
 
 import pytest
 
 import paraflex
+import paraflex as pf
 from paraflex import cache_folder
+from paraflex.checks import check_planned
+from paraflex.checks.drawing import pose_of
+from paraflex.cli.inspect import describe
+from paraflex.plots.model_drawing import model_drawing
 from processes import run
 
 HEAVY = ("numba", "matplotlib", "xarray", "scipy", "numpy", "netCDF4", "pydantic")
@@ -89,6 +95,79 @@ def test_describing_a_mechanism_needs_neither_the_time_loop_nor_what_compiles():
         routines, prepared, *found = python("-c", COMMAND, *unneeded)[-1].split()
     assert int(routines) > 100
     assert (prepared, found) == ("0", [])
+
+
+def test_a_mechanism_is_drawn_without_what_datasets_need(tmp_path):
+    unneeded = ["xarray", "pandas", "dask", "pyarrow", "netCDF4", "matplotlib.pyplot", "paraflex.kernel.march"]
+    look = COMMAND.replace('["info", "raparm_i"]', '["draw", "raparm_i", "--output", sys.argv[1]]')
+    for _ in range(2):
+        routines, prepared, *found = python("-c", look, str(tmp_path / "drawing.svg"), *unneeded)[-1].split()
+        (tmp_path / "drawing.svg").unlink()
+    assert int(routines) > 100
+    assert (prepared, found) == ("0", [])
+
+
+# Calls of these are counted, by module and name.
+WORK = (
+    "paraflex.dynamics.system.build_system",
+    "paraflex.fem.eigen.eigenpairs",
+    "paraflex.dynamics.linearise.natural_frequencies",
+    "paraflex.kinematics.closure.path_follower",
+)
+
+
+@pytest.fixture
+def work(monkeypatch):
+    """What has been done since the last question: systems built, bodies' eigenproblems, vibrations, closed paths."""
+    calls = dict.fromkeys(WORK, 0)
+
+    def counted(path, function):
+        def count(*arguments, **options):
+            calls[path] += 1
+            return function(*arguments, **options)
+
+        return count
+
+    for path in WORK:
+        module, _, name = path.rpartition(".")
+        function = getattr(import_module(module), name)
+        for each in [one for key, one in sys.modules.items() if key.startswith("paraflex.")]:
+            if vars(each).get(name) is function:
+                monkeypatch.setattr(each, name, counted(path, function))
+
+    def done():
+        found = tuple(calls.values())
+        calls.update(dict.fromkeys(WORK, 0))
+        return found
+
+    return done
+
+
+def test_nothing_is_computed_twice(work):
+    """Of the mechanism with flexible and with rigid bodies one system each, of the path one without springs.
+
+    The check of a study plans with rigid bodies, and needs one more.
+    """
+    model = pf.load("raparm_i")
+    flexible = len(model.mechanism.bodies)
+    assert work() == (0, 0, 0, 0)
+    assert describe(model)["name"] == "RAParM-I"
+    assert work() == (4, flexible, 2, 1)
+    model_drawing(pose_of(model))
+    assert work() == (2, 0, 0, 1)
+    task = model.plan(samples=5, duration=0.01)
+    assert work() == (2, flexible, 0, 1)
+    check_planned(model, task, "square", task.mechanism.modes, None)
+    assert work() == (1, 0, 1, 0)
+    task.simulate("++++", warning=False)
+    pf.linearise(task)
+    assert work() == (0, 0, 0, 0)
+
+
+def test_a_changed_length_takes_one_more_system_of_each_kind(work):
+    model = pf.load("raparm_i", set={"link1.length": 0.3})
+    pf.linearise(model, mode="++++")
+    assert work() == (2, len(model.mechanism.bodies), 0, 0)
 
 
 def test_methods_are_listed_without_mechanisms():

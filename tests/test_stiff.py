@@ -26,7 +26,7 @@ from paraflex.mechanism.bodies import Material, Section
 from paraflex.plots.scene import default_magnification, scene, select
 from paraflex.report.film import animation
 from paraflex.results import drawing as drawings
-from paraflex.results.drawing import drawing_data, system_drawing
+from paraflex.results.drawing import drawing_coordinates, drawing_variables, system_drawing
 from paraflex.results.outlines import outlines
 from test_shapes import closed, point_stations
 
@@ -105,7 +105,9 @@ def test_joints_of_a_quick_return_keep_together(bent, magnified):
 
 def test_a_magnified_lever_is_visibly_bent_without_a_kink(bent):
     mechanism, _, _, drawn = bent
-    data = drawing_data(mechanism, drawn, np.zeros(1))
+    variables = {name: (("time", *dims), values) for name, (dims, values) in drawing_variables(drawn).items()}
+    labels = {"time": np.zeros(1), **drawing_coordinates(mechanism)}
+    data = xr.Dataset(variables, labels, {"mechanism": mechanism.name})
     by = default_magnification([data])
     shown = scene(select(data, None), np.zeros(1), by)
     lever = shown.bodies["lever"][0] @ [1.0, 1j]

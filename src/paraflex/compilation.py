@@ -95,12 +95,13 @@ def _compile(geometries: list[Geometry], announce: Callable[[str], None] | None)
 
 
 def _shares(geometries: list[Geometry]) -> list[list[str]]:
-    """Divide the compilation into parts GEOMETRY:PART for two processes; common functions are compiled in both."""
+    """Divide the compilation into parts GEOMETRY:PART for two processes, which load what the other has compiled."""
     parts = [[f"{geometry.value}:{part}" for part in _PARTS] for geometry in geometries]
     if len(parts) == 1:
-        return [parts[0][:1], parts[0][1:]]
+        # While the first process is at the plan, the second compiles much of what the time loop calls.
+        return [parts[0][:2], parts[0][2:]]
     # The plan part is needed once: plans treat bodies as rigid, whatever the geometry of the beams.
-    return [parts[0], parts[1][:-1]]
+    return [parts[0], parts[1][1:]]
 
 
 def _stamp(geometry: Geometry) -> Path:
@@ -145,7 +146,7 @@ def compile_parts(parts: list[str]) -> None:
 
 
 # The time loop takes as long to compile as all other parts together.
-_PARTS = {"time-loop": lambda geometry: _free_beam(geometry).march(0), "start": _call_start, "plan": _call_plan}
+_PARTS = {"plan": _call_plan, "time-loop": lambda geometry: _free_beam(geometry).march(0), "start": _call_start}
 
 if __name__ == "__main__":
     compile_all_kernels()

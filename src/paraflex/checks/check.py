@@ -20,7 +20,7 @@ from paraflex.files.schema import ModelTable
 from paraflex.findings import Finding, Verdict
 from paraflex.integrators import loose_tolerance
 from paraflex.kinematics import Circle, Path
-from paraflex.mechanism import ActuationMode, Mechanism, Start, TimeProfile
+from paraflex.mechanism import ActuationMode, Mechanism, Start, TimeProfile, standing
 from paraflex.mechanism.loads import InTime
 from paraflex.mechanism.profiles import PiecewiseProfile, TabulatedProfile, marks
 from paraflex.tracking import TrackingTask
@@ -351,7 +351,9 @@ def check_planned(
 
     Modes that cannot drive the mechanism are reported by the run.
     """
-    seen = examine(model.mechanism, assembly or model.study.assembly)
+    chosen = assembly or model.study.assembly
+    as_planned = task.mechanism is standing(model.mechanism, chosen)
+    seen = examine(model.mechanism, chosen, task.system if as_planned else None)
     found = [*implausible_numbers(model.mechanism), *pose_findings(seen), *task_findings(task, modes)]
     found += file_findings(model)
     found += path_findings(model, task.path, path, float(task.motion.t[-1]))

@@ -3,6 +3,7 @@
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import product
 from math import cos, sin
 
@@ -14,6 +15,7 @@ from paraflex.dynamics import (
     DrivenFreedoms,
     Mobility,
     System,
+    Vibration,
     build_system,
     closure_of,
     driven_freedoms,
@@ -67,8 +69,17 @@ class Examination:
     reach: DrivenFreedoms | None
     problem: str = ""
 
+    @cached_property
+    def held(self) -> Vibration:
+        """Lowest vibrations about the undeformed pose of the chosen assembly, which closes, motors held."""
+        assert self.chosen is not None
+        assert self.chosen.state is not None
+        motors = list(dict.fromkeys(motor.joint for motor in self.system.mechanism.motors))
+        state = undeformed(self.system, self.rigid, self.chosen.state)
+        return natural_frequencies(self.system, state, motors, count=LOWEST)
 
-def examine(mechanism: Mechanism, assembly: str | None = None) -> Examination:
+
+def examine(mechanism: Mechanism, assembly: str | None = None, system: System | None = None) -> Examination:
     """Close every assembly, and compute degrees of freedom and reach of the motors for the chosen one, or the first.
 
     Parameters
@@ -77,6 +88,8 @@ def examine(mechanism: Mechanism, assembly: str | None = None) -> Examination:
         Mechanism as described.
     assembly : str, optional
         Name of the chosen assembly; the first by default.
+    system : System, optional
+        System of the mechanism if it is known, otherwise it is built.
 
     Raises
     ------
@@ -84,7 +97,7 @@ def examine(mechanism: Mechanism, assembly: str | None = None) -> Examination:
         The assembly is unknown.
     """
     mechanism = standing(mechanism, assembly)
-    system, rigid = build_system(mechanism), build_system(mechanism.rigid())
+    system, rigid = system or build_system(mechanism), build_system(mechanism.rigid())
     starts = tuple(closure_of(_begun_at(rigid, one.name), one) for one in mechanism.assemblies)
     if not mechanism.assemblies:
         return Examination(system, rigid, starts, None, None, None)
@@ -159,11 +172,8 @@ def _vibration(seen: Examination, at_rest: bool) -> Iterator[Finding]:
                 "frequency-low", f"body.{name}", f"its natural frequency is {slowest:.2g} Hz, too low for a link",
                 f"look at Young's modulus, section and length of {name}: Pa and m",
             )  # fmt: skip
-    mechanism = seen.system.mechanism
-    motors = list(dict.fromkeys(motor.joint for motor in mechanism.motors))
-    state = undeformed(seen.system, seen.rigid, seen.chosen.state)
     try:
-        vibration = natural_frequencies(seen.system, state, motors, count=LOWEST)
+        vibration = seen.held
     except ProportionError as error:
         yield Finding("out-of-proportion", "assembly", str(error), OUT_OF_PROPORTION)
         return
@@ -173,7 +183,7 @@ def _vibration(seen: Examination, at_rest: bool) -> Iterator[Finding]:
     # A mechanism released out of balance moves off anyway.
     holds = seen.reach.all_motors == seen.mobility.freedoms
     if growing and (holds or (at_rest and vibration.acceleration < BALANCED)):
-        held = " with the motors held" if motors else ""
+        held = " with the motors held" if seen.system.mechanism.motors else ""
         yield Finding(
             "motions-grow", "assembly",
             f"{growing} {'motion grows' if growing == 1 else 'motions grow'} about the pose{held} instead of vibrating",

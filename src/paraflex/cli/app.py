@@ -1,5 +1,6 @@
 """Entry point of the `paraflex` command."""
 
+import atexit
 import errno
 import gc
 import io
@@ -104,6 +105,8 @@ def _set_up() -> None:
             stream.reconfigure(errors="replace")
     # Imports create a hundred thousand persistent objects: collecting garbage among them takes a tenth of the time.
     gc.set_threshold(100_000, 20, 100)
+    # So does collecting it as the process ends, where nothing is left to be done with it.
+    atexit.register(gc.freeze)
     # Dense matrices are small here, and BLAS threads wait for one another if cores are busy.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 

@@ -69,7 +69,7 @@ def draw_command(request: DrawRequest) -> None:
 
 def _write(figure: Figure, shown: Posed, output: Path) -> None:
     kind = output.suffix.lower()
-    from paraflex.plots.save import write_figure
+    from paraflex.plots.style import write_figure
 
     with whole_file(output, field=str(output.parent)) as unfinished:
         if kind == ".html":

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from paraflex.arrays import Array
-from paraflex.checks import BALANCED, check, examine
+from paraflex.checks import BALANCED, Examination, check, examine
 from paraflex.dynamics import (
     Closure,
     DrivenFreedoms,
@@ -51,10 +51,12 @@ from .inspect_tables import print_facts, print_library
 from .request import check_time, requested_model
 
 
-def frequencies(
-    model: Model, system: System, rigid: System, start: State, assembly: str, request: InfoRequest
-) -> dict[str, Any]:
+def frequencies(model: Model, seen: Examination, request: InfoRequest) -> dict[str, Any]:
     """Return natural frequencies with motors held and free, and time, acceleration and equilibrium of their pose."""
+    assert seen.chosen is not None
+    assert seen.chosen.state is not None
+    system, rigid, start, assembly = seen.system, seen.rigid, seen.chosen.state, seen.chosen.assembly
+    as_checked = request.at is None and not request.balanced
     motors = list(dict.fromkeys(motor.joint for motor in model.mechanism.motors))
     state = start if request.at is None else _pose_at(model, rigid, start, assembly, request.at, request.path)
     state = undeformed(system, rigid, state)
@@ -65,7 +67,9 @@ def frequencies(
             from paraflex.motion import UNBALANCED
 
             raise InputError(error.cause, field="--balanced", remedy=UNBALANCED) from error
-    held = natural_frequencies(system, state, motors, count=LOWEST) if motors else None
+    held = None
+    if motors:
+        held = seen.held if as_checked else natural_frequencies(system, state, motors, count=LOWEST)
     free = natural_frequencies(system, state, torque_at=motors, count=LOWEST)
     is_equilibrium = free.acceleration < BALANCED
     return {
@@ -180,12 +184,10 @@ def describe(model: Model, request: InfoRequest | None = None) -> dict[str, Any]
     }
     if seen.mobility is None or seen.reach is None:
         return facts | {"degrees_of_freedom": facts["gruebler_count"], "redundant_constraints": []}
-    assert chosen is not None
-    assert chosen.state is not None
     facts |= _mobility_facts(seen.mobility) | {"drives": _reach_facts(seen.reach)}
     # If there are no frequencies, the verdict gives the reason.
     with suppress(ProportionError):
-        facts["frequencies"] = frequencies(model, seen.system, seen.rigid, chosen.state, chosen.assembly, request)
+        facts["frequencies"] = frequencies(model, seen, request)
     return facts
 
 

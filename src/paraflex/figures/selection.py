@@ -1,13 +1,20 @@
 """Selection of the runs and points of a dataset that a figure shows."""
 
+from __future__ import annotations
+
 from collections.abc import Sequence
+from typing import TYPE_CHECKING
 
 import numpy as np
-import xarray as xr
 
 from paraflex.arrays import Array
 from paraflex.errors import InputError
 from paraflex.formatting import is_signs
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from paraflex.results.drawing import DrawnRun
 
 # Ratio of speeds along the two axes below which the end-effector is at rest along one of them, up to rounding.
 _STILL = 1e-9
@@ -21,7 +28,7 @@ def place_of(name: str, names: Sequence[str], what: str, field: str = "") -> int
     return list(names).index(name)
 
 
-def names_of(data: xr.Dataset | xr.DataArray, dim: str) -> list[str]:
+def names_of(data: xr.Dataset | xr.DataArray | DrawnRun, dim: str) -> list[str]:
     """Return the names along a dimension, such as those of modes, models, bodies or motors."""
     return [str(name) for name in data[dim].values]
 
@@ -64,7 +71,7 @@ def one_run(data: xr.Dataset, mode: str | None = None) -> xr.Dataset:
     return select_run(data, default_mode(data) if mode is None else mode)
 
 
-def point_number(data: xr.Dataset, point: str, field: str = "point") -> int:
+def point_number(data: xr.Dataset | DrawnRun, point: str, field: str = "point") -> int:
     """Return the index of a named point of results; the error message does not propose generated points."""
     names = names_of(data, "point")
     if point in names:

@@ -19,6 +19,7 @@ from pydantic import (
     ConfigDict,
     Discriminator,
     Field,
+    GetCoreSchemaHandler,
     Tag,
     ValidationInfo,
     WrapValidator,
@@ -107,11 +108,21 @@ def _refused(problem: str, remedy: str) -> PydanticCustomError:
     return PydanticCustomError("expression", "{problem}", {"problem": problem, "remedy": remedy})
 
 
+class _Once:
+    """Annotation by which pydantic makes the schema of a type once, not for each of the fields that have the type."""
+
+    def __get_pydantic_core_schema__(self, source: Any, handler: GetCoreSchemaHandler) -> Any:
+        if "schema" not in vars(self):
+            self.schema = handler(source)
+        return self.schema.copy()
+
+
 # A number, or an expression of parameters and numbers with units in quotes.
 Number = Annotated[
     float,
     Field(strict=True, allow_inf_nan=False, ge=-LARGEST, le=LARGEST),
     BeforeValidator(_number, json_schema_input_type=float | str),
+    _Once(),
 ]
 # A number of a study that stands for fields of a mechanism's file.
 NumberOfFields = Annotated[Number, WrapValidator(_with_text)]
@@ -455,7 +466,7 @@ class StartTable(_Table):
     deflection: dict[str, dict[str, Pair | DeflectionTable]] = _optional(
         "[axial, transverse] in m, or a table of axial, transverse, slope, for points of beams", {}
     )
-    velocity: VelocityTable = VelocityTable()
+    velocity: VelocityTable = VelocityTable.model_construct()
     coordinates: dict[str, CoordinatesTable] = _optional("x, y, phi and flexible of bodies", {})
     rates: dict[str, RatesTable] = _optional("rates of x, y, phi and flexible of bodies", {})
 
@@ -628,8 +639,8 @@ class ModelTable(_WithGroups):
     path: dict[str, PathTable] = Field(default={})
     controller: dict[str, AnyControllerTable] = Field(default={})
     start: StartTable | None = None
-    study: StudyDefaultsTable = StudyDefaultsTable()
-    statics: StaticsTable = StaticsTable()
+    study: StudyDefaultsTable = StudyDefaultsTable.model_construct()
+    statics: StaticsTable = StaticsTable.model_construct()
 
 
 def model_schema() -> dict[str, Any]:

@@ -5,6 +5,7 @@ with `@by_reference` are split only once, where Python calls a kernel. Kernels r
 tuples.
 """
 
+from hashlib import blake2b
 from typing import TypeVar
 
 from llvmlite import ir
@@ -22,8 +23,9 @@ class _Reference(types.Type):
 
     def __init__(self, record: type, fields: tuple[types.Type, ...]) -> None:
         self.record, self.fields = record, dict(zip(record._fields, fields, strict=True))
-        inside = ", ".join(str(field) for field in fields)
-        super().__init__(name=f"{record.__module__}.{record.__qualname__}&({inside})")
+        # The name is a part of those of all functions, so it has a digest in place of some thousand letters.
+        inside = blake2b(", ".join(map(str, fields)).encode(), digest_size=8).hexdigest()
+        super().__init__(name=f"{record.__module__}.{record.__qualname__}&{inside}")
 
 
 @register_model(_Reference)

@@ -25,9 +25,9 @@ import lazy_loader
 
 # Drawings by their modules; figures with charts are made by `charts`.
 _drawing, _, _drawings = lazy_loader.attach(__name__, submod_attrs={
-    "drawing": ["mechanism_drawing"], "equilibria": ["buckling_shapes", "deformed_shapes"], "maps": ["response_map"],
-    "mechanism": ["desired_path"], "mode_shapes": ["mode_shapes"], "parallel": ["parallel_coordinates"],
-    "save": ["save_figures"],
+    "equilibria": ["buckling_shapes", "deformed_shapes"], "maps": ["response_map"],
+    "mechanism": ["desired_path", "mechanism_drawing"], "mode_shapes": ["mode_shapes"],
+    "parallel": ["parallel_coordinates"], "save": ["save_figures"],
 })  # fmt: skip
 
 

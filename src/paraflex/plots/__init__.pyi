@@ -3,10 +3,9 @@ from typing import Any
 
 from matplotlib.figure import Figure
 
-from .drawing import mechanism_drawing as mechanism_drawing
 from .equilibria import buckling_shapes as buckling_shapes, deformed_shapes as deformed_shapes
 from .maps import response_map as response_map
-from .mechanism import desired_path as desired_path
+from .mechanism import desired_path as desired_path, mechanism_drawing as mechanism_drawing
 from .mode_shapes import mode_shapes as mode_shapes
 from .parallel import parallel_coordinates as parallel_coordinates
 from .save import save_figures as save_figures

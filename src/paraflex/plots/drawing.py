@@ -4,7 +4,6 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
-import xarray as xr
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.collections import LineCollection, PolyCollection
@@ -13,20 +12,16 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Polygon
 
-from paraflex.errors import InputError
 from paraflex.figures.shapes import figure_of
-from paraflex.formatting import number
-from .given import drawn
-from .labels import plain
 from .layout import MM, TWO_COLUMNS, page_width
 from .marks import LOOKS, by_look, key_arrow, moving_marks, still_marks
-from .scene import Limits, Scene, common_limits, default_magnification, is_plate, run_times, scale_bar, scene, select
-from .themes import Theme, theme
+from .scene import Limits, Scene, common_limits, is_plate, scale_bar
+from .themes import Theme
 
 # Largest number of bodies whose names fit under a picture.
 _MOST_NAMED = 9
 # Room above and below a drawing, and above a panel of several [mm].
-_HEAD, _FOOT, _PANEL_HEAD = 5.0, 5.5, 4.5
+HEAD, FOOT, _PANEL_HEAD = 5.0, 5.5, 4.5
 # Width of links [pt], and diameters of a body at a single place, a pin and the end-effector.
 _LINK, _DOT, PIN_SIZE, _TIP = 3.4, 7.0, 5.4, 4.2
 # Shortest line as a share of the picture: Agg draws no line of zero length, nor one that it snaps to a single pixel.
@@ -155,12 +150,12 @@ def pictures(
     page = page_width(TWO_COLUMNS)
     tall = page / columns * aspect
     lines = {heading: -(-len(row) // columns) for heading, row in rows.items()}
-    top = height = sum(count * (tall + _PANEL_HEAD) + (_HEAD if heading else 0.0) for heading, count in lines.items())
+    top = height = sum(count * (tall + _PANEL_HEAD) + (HEAD if heading else 0.0) for heading, count in lines.items())
     figure = Figure(figsize=(page * MM, height * MM), facecolor=look.ground)
     for heading, row in rows.items():
         if heading:
             figure.text(0.01, (top - 0.8) / height, heading, va="top", fontsize=8.0, color=look.ink, fontweight="bold")
-            top -= _HEAD
+            top -= HEAD
         for k, (one, title) in enumerate(row):
             line, column = divmod(k, columns)
             bottom = (top - (line + 1) * (tall + _PANEL_HEAD)) / height
@@ -224,67 +219,6 @@ def caption(shown: Scene) -> str:
     if shown.magnified == 1.0:
         return "true deflections"
     return "links drawn stiff" if shown.magnified == 0.0 else f"deflections × {shown.magnified:g}"
-
-
-@drawn
-def mechanism_drawing(
-    data: xr.Dataset,
-    mode: str | None = None,
-    time: float | None = None,
-    magnify: float | None = None,
-    *,
-    model: str | None = None,
-    width: float = 84.0,
-    theme_name: str = "light",
-    point: str | None = None,
-) -> Figure:
-    """Draw the mechanism at one time, with the end-effector's trail up to that time and its desired path.
-
-    Parameters
-    ----------
-    time : float, optional
-        Time of the drawing [s]; the middle of the run by default.
-    magnify : float, optional
-        Magnification of deflections: joints stay in place, links bend more. The default is a round number at which
-        bending is visible.
-    model : str, optional
-        Model of a verification; the reference model by default.
-    width : float
-        Width of the figure [mm].
-    theme_name : str
-        Theme of colours, "light" (default) or "dark".
-    point : str, optional
-        Point "body.point" whose trail is drawn in place of the end-effector's.
-    """
-    look, width = theme(theme_name), page_width(width)
-    run = select(data, mode, model)
-    first, last = run_times(run)
-    time = 0.5 * (first + last) if time is None else time
-    if not first <= time <= last:
-        raise InputError("outside the run", field="time", value=time, remedy=f"choose it from {first:g} to {last:g} s")
-    until = run["time"].values
-    magnify = default_magnification([run]) if magnify is None else magnify
-    shown = scene(run, np.append(until[until < time], time), magnify, point)
-    limits, aspect = shown.limits.filling(0.4, 1.25)
-    height = width * aspect + _HEAD + _FOOT
-    figure = Figure(figsize=(width * MM, height * MM), facecolor=look.ground)
-    axes = bare(figure.add_axes((0.0, _FOOT / height, 1.0, 1.0 - (_HEAD + _FOOT) / height)), limits)
-    sketch = Sketch(axes, shown, limits, look, width=0.5)
-    sketch.show(len(shown.time) - 1)
-    draw_scale_bar(figure, sketch.limits, look, (0.98, 1.5 / height), 6.5)
-    draw_load_keys(figure, shown, sketch.limits, look, (0.02, 2.5 / height), 6.5)
-    title = [shown.mechanism, *([f"mode {plain(shown.mode)}"] if shown.mode else [])]
-    figure.text(0.02, 0.985, ", ".join(title), va="top", color=look.ink, fontsize=7.0)
-    figure.text(
-        0.98,
-        0.985,
-        f"t = {number(time, 3, padded=True)} s, {caption(shown)}",
-        va="top",
-        ha="right",
-        color=look.ink,
-        fontsize=7.0,
-    )
-    return figure
 
 
 def name_links(figure: Figure, shown: Scene, look: Theme, size: float, y: float) -> None:

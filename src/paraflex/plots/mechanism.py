@@ -10,15 +10,17 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from paraflex.arrays import Array
+from paraflex.errors import InputError
 from paraflex.figures.selection import names_of, samples
 from paraflex.figures.shapes import along, figure_of
+from paraflex.formatting import number
 from paraflex.results.outlines import figure_order
-from .drawing import Sketch
+from .drawing import FOOT, HEAD, Sketch, bare, caption, draw_load_keys, draw_scale_bar
 from .given import drawn
-from .labels import symbol
-from .layout import ONE_COLUMN, finish_plane, panels
+from .labels import plain, symbol
+from .layout import MM, ONE_COLUMN, finish_plane, page_width, panels
 from .marks import still_marks
-from .scene import DrawnJoint, Scene, limits_of, run_times, scene
+from .scene import DrawnJoint, Scene, default_magnification, limits_of, run_times, scene, select
 from .style import BLACK, BLUE
 from .themes import theme
 
@@ -41,6 +43,67 @@ def desired_path(data: xr.Dataset) -> Figure:
     axes.plot(*path[0], **_START)
     draw_mechanism(axes, data, path)
     return finish_plane(figure, axes)
+
+
+@drawn
+def mechanism_drawing(
+    data: xr.Dataset,
+    mode: str | None = None,
+    time: float | None = None,
+    magnify: float | None = None,
+    *,
+    model: str | None = None,
+    width: float = 84.0,
+    theme_name: str = "light",
+    point: str | None = None,
+) -> Figure:
+    """Draw the mechanism at one time, with the end-effector's trail up to that time and its desired path.
+
+    Parameters
+    ----------
+    time : float, optional
+        Time of the drawing [s]; the middle of the run by default.
+    magnify : float, optional
+        Magnification of deflections: joints stay in place, links bend more. The default is a round number at which
+        bending is visible.
+    model : str, optional
+        Model of a verification; the reference model by default.
+    width : float
+        Width of the figure [mm].
+    theme_name : str
+        Theme of colours, "light" (default) or "dark".
+    point : str, optional
+        Point "body.point" whose trail is drawn in place of the end-effector's.
+    """
+    look, width = theme(theme_name), page_width(width)
+    run = select(data, mode, model)
+    first, last = run_times(run)
+    time = 0.5 * (first + last) if time is None else time
+    if not first <= time <= last:
+        raise InputError("outside the run", field="time", value=time, remedy=f"choose it from {first:g} to {last:g} s")
+    until = run["time"].values
+    magnify = default_magnification([run]) if magnify is None else magnify
+    shown = scene(run, np.append(until[until < time], time), magnify, point)
+    limits, aspect = shown.limits.filling(0.4, 1.25)
+    height = width * aspect + HEAD + FOOT
+    figure = Figure(figsize=(width * MM, height * MM), facecolor=look.ground)
+    axes = bare(figure.add_axes((0.0, FOOT / height, 1.0, 1.0 - (HEAD + FOOT) / height)), limits)
+    sketch = Sketch(axes, shown, limits, look, width=0.5)
+    sketch.show(len(shown.time) - 1)
+    draw_scale_bar(figure, sketch.limits, look, (0.98, 1.5 / height), 6.5)
+    draw_load_keys(figure, shown, sketch.limits, look, (0.02, 2.5 / height), 6.5)
+    title = [shown.mechanism, *([f"mode {plain(shown.mode)}"] if shown.mode else [])]
+    figure.text(0.02, 0.985, ", ".join(title), va="top", color=look.ink, fontsize=7.0)
+    figure.text(
+        0.98,
+        0.985,
+        f"t = {number(time, 3, padded=True)} s, {caption(shown)}",
+        va="top",
+        ha="right",
+        color=look.ink,
+        fontsize=7.0,
+    )
+    return figure
 
 
 def _draw_direction(axes: Axes, path: Array) -> None:

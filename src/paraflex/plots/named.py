@@ -75,7 +75,8 @@ def _candidates(anchors: Array, half: Array) -> tuple[Array, Array, Indices]:
 def _covered(centres: Array, half: Array, taken: Array, boxes: Array, panel: Array) -> Array:
     """Return the cost (c,) of what the boxes around the centres cover."""
     low, high = centres - half, centres + half
-    inside = np.all((taken > low[:, None] - 1.0) & (taken < high[:, None] + 1.0), axis=2).sum(axis=1)
+    within = [(taken[:, k] > low[:, None, k] - 1.0) & (taken[:, k] < high[:, None, k] + 1.0) for k in range(2)]
+    inside = np.count_nonzero(within[0] & within[1], axis=1)
     wide = np.minimum(high[:, None, 0], boxes[:, 2]) - np.maximum(low[:, None, 0], boxes[:, 0])
     tall = np.minimum(high[:, None, 1], boxes[:, 3]) - np.maximum(low[:, None, 1], boxes[:, 1])
     over = np.sum(np.maximum(wide, 0.0) * np.maximum(tall, 0.0), axis=1) / (4.0 * half[0] * half[1])

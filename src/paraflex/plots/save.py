@@ -3,10 +3,9 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, TextIO
+from typing import Any
 
 import xarray as xr
-from matplotlib.figure import Figure
 
 from paraflex.arguments import checked_arguments
 from paraflex.errors import InputError
@@ -17,11 +16,7 @@ from paraflex.writing import portable_name, whole_file
 from .layout import column_width
 from .planned import PlannedFigure, drawings, figures_of
 from .sources import Source, kind_of_numbers
-from .style import journal_style
-
-# Metadata without dates, so that files do not depend on when they are written.
-_METADATA: Mapping[str, dict[str, Any]] = {"png": {}, "svg": {"Date": None}, "pdf": {"CreationDate": None}}
-FIGURE_FORMATS = tuple(_METADATA)
+from .style import FIGURE_FORMATS, write_figure
 
 
 @checked_arguments()
@@ -122,9 +117,3 @@ def write_figures(
                 with whole_file(new / file.name, field=str(new)) as unfinished:
                     write_figure(figure, unfinished, file.suffix[1:], dpi)
     return [file for drawing in drawn for file in files[drawing.stem]]
-
-
-def write_figure(figure: Figure, file: Path | TextIO, format_name: str, dpi: float | None = None) -> None:
-    """Write a figure in one of FIGURE_FORMATS; its bytes do not depend on the date."""
-    with journal_style():
-        figure.savefig(file, format=format_name, metadata=_METADATA[format_name], dpi="figure" if dpi is None else dpi)

@@ -4,12 +4,13 @@ Scenes are drawn by Matplotlib (`plots/drawing.py`), as SVG (`plots/svg.py`) and
 (`report/film.py`).
 """
 
+from __future__ import annotations
+
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
-import xarray as xr
 
 from paraflex.arrays import Array
 from paraflex.errors import InputError, suggestion
@@ -17,7 +18,13 @@ from paraflex.figures.selection import names_of, point_number, select_run
 from paraflex.figures.shapes import figure_of
 from paraflex.folders import RESULT_KINDS
 from paraflex.formatting import display_unit, printable, quantity
-from paraflex.results.kinds import kind_of
+
+if TYPE_CHECKING:
+    import xarray as xr
+
+    from paraflex.results.drawing import DrawnRun
+
+    Run = xr.Dataset | DrawnRun
 
 # Variables of joints, and their counterparts for the bodies of shape_base.
 JOINT_BASES = {"joint_position": "joint_base", "joint_direction": "joint_direction_base"}
@@ -53,7 +60,7 @@ class Limits(NamedTuple):
         """Larger side [m]."""
         return max(self.right - self.left, self.top - self.bottom)
 
-    def filling(self, flattest: float, tallest: float) -> "tuple[Limits, float]":
+    def filling(self, flattest: float, tallest: float) -> tuple[Limits, float]:
         """Return the limits extended to fill a panel, and the panel's ratio of height to width.
 
         The ratio is that of the limits, clipped to the range from `flattest` to `tallest`.
@@ -61,7 +68,7 @@ class Limits(NamedTuple):
         aspect = float(np.clip((self.top - self.bottom) / (self.right - self.left), flattest, tallest))
         return self.fitted(1.0 / aspect), aspect
 
-    def fitted(self, ratio: float) -> "Limits":
+    def fitted(self, ratio: float) -> Limits:
         """Return the limits extended to a panel with this ratio of width to height."""
         width, height = self.right - self.left, self.top - self.bottom
         wide, high = max(ratio * height - width, 0.0) / 2.0, max(width / ratio - height, 0.0) / 2.0
@@ -188,6 +195,8 @@ def run_times(data: xr.Dataset) -> tuple[float, float]:
 
 def check_shapes(data: xr.Dataset) -> None:
     """Check that results have the shapes that drawings need; raise InputError otherwise."""
+    from paraflex.results.kinds import kind_of
+
     RESULT_KINDS[kind_of(data)].refuse("motion", "results")
     if "shape" not in data:
         raise InputError(
@@ -216,13 +225,13 @@ def select(data: xr.Dataset, mode: str | None, model: str | None = None) -> xr.D
     return data
 
 
-def scene(run: xr.Dataset, times: Array, magnify: float = 1.0, point: str | None = None) -> Scene:
+def scene(run: Run, times: Array, magnify: float = 1.0, point: str | None = None) -> Scene:
     """Describe a run at given times with magnified deflections.
 
     Parameters
     ----------
-    run : xarray.Dataset
-        Single run, from `select`.
+    run : xarray.Dataset or DrawnRun
+        Single run, from `select`, or a drawing.
     times : (f,) array
         Times of the pictures [s]; after the end of a run its last state is repeated.
     magnify : float
@@ -267,7 +276,7 @@ def scene(run: xr.Dataset, times: Array, magnify: float = 1.0, point: str | None
     reach = np.concatenate([reach, *(load.place - ARROW * size * load.force for load in loads)])
     return Scene(
         mechanism=printable(str(run.attrs["mechanism"])),
-        mode=str(run["mode"].item()) if "mode" in run.coords else "",
+        mode=str(run["mode"].values) if "mode" in run.coords else "",
         time=times,
         magnified=magnify,
         bodies={name: at(drawn[:, own]) for name, own in bodies.items()},
@@ -286,7 +295,7 @@ def scene(run: xr.Dataset, times: Array, magnify: float = 1.0, point: str | None
     )
 
 
-def _magnified_joints(run: xr.Dataset, name: str, magnify: float) -> Array:
+def _magnified_joints(run: Run, name: str, magnify: float) -> Array:
     """Return positions or directions of joints, magnified like the bodies; those of older results are unchanged."""
     values = run[name].values.astype(float)
     base = JOINT_BASES[name]
@@ -294,10 +303,11 @@ def _magnified_joints(run: xr.Dataset, name: str, magnify: float) -> Array:
 
 
 def _joints(
-    run: xr.Dataset, drawn: Array, places: Array, directions: Array, at: Callable[[Array], Array]
+    run: Run, drawn: Array, places: Array, directions: Array, at: Callable[[Array], Array]
 ) -> tuple[DrawnJoint, ...]:
     """Return the joints of a run; results of earlier versions have no data on motors and rails on moving bodies."""
-    names, count = run["joint"].values, run.sizes["joint"]
+    names = run["joint"].values
+    count = len(names)
     driven = run["joint_driven"].values if "joint_driven" in run else np.zeros(count, dtype=bool)
     rails = run["joint_rail"].values if "joint_rail" in run else np.full(count, -1)
     return tuple(
@@ -310,7 +320,7 @@ def _joints(
     )  # fmt: skip
 
 
-def default_magnification(runs: Sequence[xr.Dataset]) -> float:
+def default_magnification(runs: Sequence[Run]) -> float:
     """Return the largest of MAGNIFICATIONS at which no deflection exceeds 8 % of the mechanism's size.
 
     It is 1 if there is none, or if deflections remain invisible (below 0.5 %) at the largest magnification.
@@ -341,7 +351,7 @@ class _Sampler:
         return (1.0 - part) * values[self.first] + part * values[self.last]
 
 
-def followed_station(run: xr.Dataset, point: str | None = None) -> int | None:
+def followed_station(run: Run, point: str | None = None) -> int | None:
     """Return the station whose trail is drawn: that of a given point, by default the end-effector.
 
     Without an end-effector it is the point with the longest path, free points before joints; None if nothing moves.
@@ -367,14 +377,14 @@ def followed_station(run: xr.Dataset, point: str | None = None) -> int | None:
     return None
 
 
-def _anchors(run: xr.Dataset) -> tuple[Array, ...]:
+def _anchors(run: Run) -> tuple[Array, ...]:
     if "spring_position" not in run:
         return ()
     first = run["spring_position"].values[0].astype(float)
     return tuple(first[i, end] for i, end in zip(*np.nonzero(run["spring_station"].values < 0), strict=True))
 
 
-def _springs(run: xr.Dataset, drawn: Array) -> dict[str, Array]:
+def _springs(run: Run, drawn: Array) -> dict[str, Array]:
     if "spring_position" not in run:
         return {}
     places = run["spring_position"].values.astype(float)
@@ -383,7 +393,7 @@ def _springs(run: xr.Dataset, drawn: Array) -> dict[str, Array]:
     return {str(name): places[:, i] for i, name in enumerate(run["spring"].values)}
 
 
-def _gears(run: xr.Dataset, joints: Array, directions: Array) -> tuple[DrawnGear, ...]:
+def _gears(run: Run, joints: Array, directions: Array) -> tuple[DrawnGear, ...]:
     """Return the gears between joints with given positions (f, joints, 2) and directions (f, joints)."""
     if "gear_joint" not in run:
         return ()
@@ -394,9 +404,7 @@ def _gears(run: xr.Dataset, joints: Array, directions: Array) -> tuple[DrawnGear
     )
 
 
-def _loads(
-    run: xr.Dataset, drawn: Array, time: Array, times: Array, at: Callable[[Array], Array]
-) -> tuple[DrawnLoad, ...]:
+def _loads(run: Run, drawn: Array, time: Array, times: Array, at: Callable[[Array], Array]) -> tuple[DrawnLoad, ...]:
     """Return the loads of a run relative to its largest force and torque; results of earlier versions have none."""
     if "load_force" not in run:
         return ()
@@ -429,7 +437,7 @@ def _strongest(values: Array, time: Array, times: Array, at: Callable[[Array], A
     return out
 
 
-def _load_keys(run: xr.Dataset) -> dict[str, str]:
+def _load_keys(run: Run) -> dict[str, str]:
     """Return the texts that state the magnitudes of the largest "force" and "torque", if there are such loads."""
     if "load_force" not in run:
         return {}

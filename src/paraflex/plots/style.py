@@ -1,10 +1,12 @@
 """Style of every figure: fonts, and lines that are distinguishable in black and white."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from typing import Any
+from pathlib import Path
+from typing import Any, TextIO
 
 import matplotlib.style
+from matplotlib.figure import Figure
 
 # Okabe and Ito (2008), Color Universal Design; their yellow is omitted because it is too light for a thin line.
 BLACK, BLUE, VERMILLION, GREEN = "#000000", "#0072B2", "#D55E00", "#009E73"
@@ -53,6 +55,9 @@ STYLE: dict[str, Any] = {
     "pdf.fonttype": 42,
     "ps.fonttype": 42,
 }
+# Metadata without dates, so that files do not depend on when they are written.
+_METADATA: Mapping[str, dict[str, Any]] = {"png": {}, "svg": {"Date": None}, "pdf": {"CreationDate": None}}
+FIGURE_FORMATS = tuple(_METADATA)
 
 
 @contextmanager
@@ -60,3 +65,9 @@ def journal_style() -> Iterator[None]:
     """Draw in the style of this package, on Matplotlib's defaults, without reading or changing the user's settings."""
     with matplotlib.style.context(STYLE, after_reset=True):
         yield
+
+
+def write_figure(figure: Figure, file: Path | TextIO, format_name: str, dpi: float | None = None) -> None:
+    """Write a figure in one of FIGURE_FORMATS; its bytes do not depend on the date."""
+    with journal_style():
+        figure.savefig(file, format=format_name, metadata=_METADATA[format_name], dpi="figure" if dpi is None else dpi)

@@ -5,7 +5,4 @@ Names are imported at their first use, so that files can be read without importi
 
 import lazy_loader
 
-# The module `summary` has the name of its function and would replace it if it were imported later.
-from .summary import summary as summary
-
 __getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

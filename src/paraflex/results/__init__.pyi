@@ -13,6 +13,7 @@ from .linear_summary import linear_summary as linear_summary
 from .motion_data import motion_dataset as motion_dataset
 from .reduction_data import reduction_dataset as reduction_dataset
 from .reduction_summary import reduction_summary as reduction_summary
+from .run_summary import motion_summary as motion_summary, summary as summary
 from .statics_data import statics_dataset as statics_dataset, statics_summary as statics_summary
 from .storage import (
     load_results as load_results,
@@ -20,4 +21,3 @@ from .storage import (
     results_file as results_file,
     save_results as save_results,
 )
-from .summary import motion_summary as motion_summary, summary as summary

@@ -3,10 +3,9 @@
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from itertools import pairwise
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
-import xarray as xr
 
 from paraflex.arrays import Array, Complex, Numbers
 from paraflex.dynamics import System, material_angle
@@ -52,6 +51,37 @@ class Drawing:
     directions: Array
     direction_bases: Array
     springs: Array
+
+
+class Values(NamedTuple):
+    """Variable of a drawn run."""
+
+    values: Any
+
+
+class DrawnRun:
+    """Drawing at k times with what scenes use of a run's dataset; xarray takes longer to import than all else to do.
+
+    Attributes
+    ----------
+    coords : mapping of str to array
+        Labels, as of a dataset.
+    attrs : mapping of str to str
+        Name of the mechanism, and the point of its end-effector if there is one.
+    """
+
+    def __init__(self, moving: Mapping[str, Numbers], coords: Mapping[str, Any], attrs: Mapping[str, str]) -> None:
+        self._moving, self.coords, self.attrs = moving, coords, attrs
+
+    def __contains__(self, name: str) -> bool:
+        return name in self._moving or name in self.coords
+
+    def __getitem__(self, name: str) -> Values:
+        return Values(self._moving[name] if name in self._moving else self.coords[name])
+
+    def isel(self, time: slice) -> "DrawnRun":
+        """Return the drawing at some of its times."""
+        return DrawnRun({name: values[time] for name, values in self._moving.items()}, self.coords, self.attrs)
 
 
 def drawing(
@@ -121,7 +151,7 @@ def system_drawing(system: System, q: Array) -> Drawing:
     return drawing(system.described, shapes, lambda ref: material_angle(system, ref, q), frame)
 
 
-def assembled_data(mechanism: Mechanism) -> xr.Dataset | None:
+def assembled_data(mechanism: Mechanism) -> DrawnRun | None:
     """Return the drawing variables of a mechanism in its first assembly, undeformed, as a run of one sample.
 
     Loops are closed only as accurately as the given angles close them. Bodies whose poses cannot be derived from the
@@ -142,14 +172,15 @@ def assembled_data(mechanism: Mechanism) -> xr.Dataset | None:
     return drawing_data(mechanism, drawing(mechanism, shapes, lambda ref: frame(ref.body)[1], frame), np.zeros(1))
 
 
-def drawing_data(mechanism: Mechanism, one: Drawing, time: Array) -> xr.Dataset:
-    """Return a drawing at times (k,) as a dataset of a run that holds the drawn variables only."""
+def drawing_data(mechanism: Mechanism, one: Drawing, time: Array) -> DrawnRun:
+    """Return a drawing at times (k,) as a run that holds the drawn variables only."""
     effector = mechanism.end_effector
-    return xr.Dataset(
-        {name: (("time", *dims), values) for name, (dims, values) in drawing_variables(one).items()},
-        coords={"time": time, **drawing_coordinates(mechanism)},
-        attrs={"mechanism": mechanism.name} | ({} if effector is None else {"end_effector_point": str(effector.point)}),
-    )  # fmt: skip
+    labels = drawing_coordinates(mechanism).items()
+    return DrawnRun(
+        {"time": time, **{name: values for name, (_, values) in drawing_variables(one).items()}},
+        {name: np.array(given[1] if isinstance(given, tuple) else given) for name, given in labels},
+        {"mechanism": mechanism.name} | ({} if effector is None else {"end_effector_point": str(effector.point)}),
+    )
 
 
 def drawing_variables(

@@ -4,7 +4,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-import xarray as xr
 
 from paraflex.arrays import Array
 from paraflex.dynamics import System, closure_of, moment_signals, reference_pose, standing_system, start_state
@@ -15,7 +14,7 @@ from paraflex.formatting import number
 from paraflex.kinematics import Path, follow_path
 from paraflex.mechanism import Mechanism, PointRef, Start
 from .acting import first_movements, first_movements_along
-from .drawing import drawing_data, system_drawing
+from .drawing import DrawnRun, drawing_data, system_drawing
 
 # Number of poses along a path, which give the length of rails, and of points of the drawn path.
 _POSES, _PLACES = 81, 801
@@ -33,7 +32,7 @@ class Posed:
         Mechanism as described.
     assembly : str
         Name of the assembly; empty if the start gives all coordinates.
-    data : xarray.Dataset
+    data : DrawnRun
         Drawn variables as of a run: the start, and the rigid motion along the path if there is one.
     path : str
         Name of the path on which the mechanism starts; empty without a path.
@@ -55,7 +54,7 @@ class Posed:
 
     mechanism: Mechanism
     assembly: str
-    data: xr.Dataset
+    data: DrawnRun
     path: str = ""
     desired: Array | None = None
     gaps: Mapping[str, str] = field(default_factory=dict)
