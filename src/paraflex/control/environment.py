@@ -326,12 +326,13 @@ class Environment(Env[Array, Numbers]):
             Options, or a mechanism of `vary` with other members.
         """
         super().reset(seed=seed)
+        self.running, self.begun = False, None
         if options:
             raise InputError("there are none", field="options", value=options, remedy="leave them out")
         if self._vary is not None:
             self.simulation = self._varied(self._vary(self.np_random))
         readings = self.simulation.reset()
-        self._step, self.running, self.begun = 0, True, None
+        self._step, self.running = 0, True
         self._seen = self._observe(0, readings, self.np_random)
         return self._seen.copy(), self._info(np.zeros(len(self.motors)))
 

@@ -148,9 +148,8 @@ class NativeRun:
     @cached_property
     def _time_loop(self) -> Callable[..., int]:
         """Machine code for the types of this run's data: Numba takes 15 us to look at them."""
-        entry = march.from_python
         given = self._arguments(self.problem.signals, self.problem.stops, 0)
-        return entry.compile(tuple(entry.typeof_pyval(each) for each in given))
+        return march.from_python.compile(tuple(map(march.from_python.typeof_pyval, given)))
 
     def __getstate__(self) -> dict[str, Any]:
         """Return the fields to be copied or pickled, without the machine code."""
