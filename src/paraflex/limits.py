@@ -51,6 +51,8 @@ PATH_POINTS = 10_000
 SHAPER_IMPULSES = 256
 # Designs of a study: at ten runs per second they take twelve days, and the table of more would fill the memory.
 DESIGNS = 10_000_000
+# Simulations of a vector environment: with a hundred coordinates and a thousand periods each takes 8 MB.
+ENVIRONMENTS = 1024
 # Remedy for numbers that lead to overflow or singular matrices.
 OUT_OF_PROPORTION = "check lengths, masses and stiffnesses: they are in SI units"
 

@@ -1,11 +1,13 @@
-"""Gymnasium environment of a simulation, for reinforcement learning and other agents that act and observe.
+"""Gymnasium environments of one simulation or several, for reinforcement learning and others that act and observe.
 
 Gymnasium is an optional dependency: this module can be imported without it, but makes no environments then. With it the
 environment "paraflex/RAParM-I-v0" is registered. Agents observe readings, optionally less the planned readings, and a
 preview of the plan.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+import os
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor, wait
 from functools import partial
 from typing import TYPE_CHECKING, Any
 
@@ -15,9 +17,10 @@ from paraflex.arguments import checked_arguments
 from paraflex.arrays import Array, Numbers
 from paraflex.dynamics import State
 from paraflex.dynamics.points import marker_position
-from paraflex.errors import InputError, IntegrationError
+from paraflex.errors import InputError, IntegrationError, as_enum
 from paraflex.integrators import IntegrationOptions, Method
 from paraflex.kinematics import ModelWithPaths
+from paraflex.limits import ENVIRONMENTS, at_most
 from paraflex.mechanism import ActuationMode, Mechanism, Start
 from paraflex.mechanism.measured import encoders_of, measured_sensors
 from paraflex.mechanism.quantities import all_known, known, not_negative, positive
@@ -29,11 +32,13 @@ from .loop.together import by_name, checked_number, periods_in, real_numbers
 
 if TYPE_CHECKING:
     from gymnasium import Env, Space
+    from gymnasium.vector import SyncVectorEnv
 else:
     try:
         from gymnasium import Env
+        from gymnasium.vector import SyncVectorEnv
     except ImportError:
-        from .no_gymnasium import Env
+        from .no_gymnasium import Env, Env as SyncVectorEnv
 
 # Observations are clipped to this magnitude, as observation spaces must be bounded; readings of a run that has not
 # diverged stay far below.
@@ -85,6 +90,7 @@ class Observer:
         scales: Mapping[str, float] | None,
     ) -> None:
         self._sensors = names
+        self._noisy, self._coarse = bool(noise), bool(quantise)
         self._deviations = _by_sensor(noise, names, "noise", 0.0)
         self._resolution = _by_sensor(quantise, names, "quantise", 0.0)
         scale = _by_sensor(scales, names, "scales", 1.0)
@@ -111,11 +117,12 @@ class Observer:
     def __call__(self, k: int, readings: Mapping[str, float], random: np.random.Generator) -> Array:
         """Return the observation (names,) at instant k from the readings of all sensors, with noise from `random`."""
         y = np.array([readings[name] for name in self._sensors])
-        if np.any(self._deviations):
+        if self._noisy:
             y += self._deviations * random.standard_normal(y.size)
-        y = rounded(y, self._resolution)
+        if self._coarse:
+            y = rounded(y, self._resolution)
         seen = np.concatenate([y - self._planned[k], self._changes[k]]) / self._scale
-        return np.clip(seen, -WIDEST, WIDEST)
+        return np.minimum(np.maximum(seen, -WIDEST), WIDEST)
 
 
 def observed_sensors(given: Sequence[str] | None, simulation: Simulation) -> tuple[str, ...]:
@@ -150,12 +157,9 @@ Reward = Callable[[Simulation, Mapping[str, float], Array], float]
 _CORRECTING = 0.1
 # With 0.25 ms steps deviations of RAParM-I are accurate to 1 %.
 _STEP = 2.5e-4
-# Environments of the library: entry points and their settings.
-REGISTERED: dict[str, tuple[str, dict[str, Any]]] = {
-    "paraflex/RAParM-I-v0": (
-        "paraflex.library:environment",
-        {"name": "raparm_i", "options": IntegrationOptions(method="generalised-alpha", step=_STEP)},
-    )
+# Environments of the library and their settings.
+REGISTERED: dict[str, dict[str, Any]] = {
+    "paraflex/RAParM-I-v0": {"name": "raparm_i", "options": IntegrationOptions(method="generalised-alpha", step=_STEP)},
 }
 
 
@@ -298,7 +302,10 @@ class Environment(Env[Array, Numbers]):
         )  # fmt: skip
         self.observed: tuple[str, ...] = self._observe.names
         self._desired = None if task is None else task.plan.follow(self._times).desired.position
-        self._step: int | None = None
+        # Whether an episode is running, its period, and the action of a period that was simulated before `step`.
+        self.running, self._step = False, 0
+        self.begun: Array | None = None
+        self._failure: IntegrationError | None = None
         self._seen: Array = np.zeros(len(self.observed))
         self.action_space: Space[Any] = Box(-1.0, 1.0, (len(self.motors),), np.float32)
         self.observation_space: Space[Any] = Box(-WIDEST, WIDEST, (len(self.observed),), np.float64)
@@ -319,12 +326,13 @@ class Environment(Env[Array, Numbers]):
             Options, or a mechanism of `vary` with other members.
         """
         super().reset(seed=seed)
+        self.running, self.begun = False, None
         if options:
             raise InputError("there are none", field="options", value=options, remedy="leave them out")
         if self._vary is not None:
             self.simulation = self._varied(self._vary(self.np_random))
         readings = self.simulation.reset()
-        self._step = 0
+        self._step, self.running = 0, True
         self._seen = self._observe(0, readings, self.np_random)
         return self._seen.copy(), self._info(np.zeros(len(self.motors)))
 
@@ -346,30 +354,47 @@ class Environment(Env[Array, Numbers]):
         gymnasium.error.ResetNeeded
             The episode has ended, or none has begun.
         """
-        if self._step is None:
+        if not self.running:
             from gymnasium.error import ResetNeeded
 
             raise ResetNeeded("the episode has ended, or none has begun; call reset()")
-        action = self._cut(action)
-        self._step += 1
+        applied, self.begun = self.begun, None
+        if applied is None:
+            applied = _within(action, self.limits.shape, self.motors, "action")
+            self.begin_period(applied)
+            self.simulate_period()
         try:
-            readings = self.simulation.step(action * self.limits, float(self._times[self._step]))
+            if self._failure is not None:
+                raise self._failure
+            readings = self.simulation._end_step()
         except IntegrationError as error:
-            return self._terminated(error, action)
+            return self._terminated(error, applied)
         self._seen = self._observe(self._step, readings, self.np_random)
-        info = self._info(action)
-        reward = self._reward_of(readings, action, info)
+        info = self._info(applied)
+        reward = self._reward_of(readings, applied, info)
         truncated = self._step == self._times.size - 1
-        if truncated:
-            self._step = None
+        self.running = not truncated
         return self._seen.copy(), reward, False, truncated, info
+
+    def begin_period(self, action: Array) -> None:
+        """Apply an action (motors,) from -1 to 1, for `simulate_period`."""
+        if self.begun is not None:
+            raise InputError("is running: a reward may not step it", field="environment", remedy="make another")
+        self._step, self._failure = self._step + 1, None
+        self.simulation._begin_step(action * self.limits, float(self._times[self._step]))
+
+    def simulate_period(self) -> None:
+        """Simulate the period that has begun, on any thread: kernels release the interpreter lock."""
+        try:
+            self.simulation._move(float(self._times[self._step]))
+        except IntegrationError as error:
+            self._failure = error
 
     def _terminated(self, error: IntegrationError, action: Array) -> tuple[Array, float, bool, bool, dict[str, Any]]:
         """Return the result of `step` where the run cannot continue."""
-        assert self._step is not None
         left = self._times.size - self._step
         info = {"time": self.simulation.time, "torques": action * self.limits, "error": str(error)}
-        self._step = None
+        self.running = False
         return self._seen.copy(), -self._penalty * left, True, False, info
 
     def _reward_of(self, readings: Mapping[str, float], action: Array, info: Mapping[str, Any]) -> float:
@@ -384,16 +409,8 @@ class Environment(Env[Array, Numbers]):
         if self._desired is not None and effector is not None:
             system = self.simulation.system
             place = marker_position(system, system.marker(effector.point), self.simulation.state.q)
-            info["deviation"] = float(np.linalg.norm(place - self._desired[self._step]))
+            info["deviation"] = float(np.sqrt((away := place - self._desired[self._step]) @ away))
         return info
-
-    def _cut(self, action: Any) -> Array:
-        """Return an action clipped to the limits."""
-        given = real_numbers(action)
-        if given is None or given.shape != (len(self.motors),) or not np.all(np.isfinite(given)):
-            raise InputError(f"not {len(self.motors)} finite numbers", field="action", value=action,
-                             remedy=f"give one from -1 to 1 for each of {', '.join(self.motors)}")  # fmt: skip
-        return np.clip(given, -1.0, 1.0)
 
     def _varied(self, mechanism: Mechanism) -> Simulation:
         """Return the simulation of another mechanism with the same members."""
@@ -404,6 +421,124 @@ class Environment(Env[Array, Numbers]):
             return Simulation(self._task.remodelled(mechanism), **self._settings)
         settings: dict[str, Any] = self._settings | {"duration": self._duration}
         return Simulation(mechanism, **settings)
+
+
+class VectorEnvironment(SyncVectorEnv[Array, Numbers]):
+    """Gymnasium's `SyncVectorEnv` of environments of one mechanism, with the same results, but kernels run on threads.
+
+    Functions `reward` and `vary` do not. An episode that is terminated has no effect on the others.
+
+    Parameters
+    ----------
+    source : TrackingTask, Mechanism or Model
+        See `Environment`.
+    num_envs : int
+        Number of environments.
+    threads : int, optional
+        Number of threads; by default, that of processors.
+    autoreset_mode : str or gymnasium.vector.AutoresetMode
+        "NextStep": the step after the end of an episode ignores the action and begins another. "SameStep": the last
+        step begins it. "Disabled": `reset` begins it, with options={"reset_mask": (num_envs,) array of bool}.
+    **settings
+        Further arguments of `Environment`.
+
+    Raises
+    ------
+    InputError
+        Gymnasium is not installed; numbers that are not positive; too many environments; an unknown mode; or arguments
+        that `Environment` rejects.
+    """
+
+    envs: list[Environment]  # pyright: ignore[reportIncompatibleVariableOverride]
+
+    @checked_arguments()
+    def __init__(
+        self, source: TrackingTask | Mechanism | ModelWithPaths, num_envs: int = 1, *, threads: int | None = None,
+        autoreset_mode: Any = "NextStep", **settings: Any,
+    ) -> None:  # fmt: skip
+        from gymnasium.vector import AutoresetMode
+
+        for name, number in (("num_envs", num_envs), ("threads", 1 if threads is None else threads)):
+            positive(number, name, name)
+        at_most(num_envs, ENVIRONMENTS, "num_envs")
+        mode = as_enum(AutoresetMode, autoreset_mode, "autoreset_mode")
+        super().__init__([partial(Environment, source, **settings)] * num_envs, autoreset_mode=mode)
+        self._others = min(num_envs, threads or os.cpu_count() or 1) - 1
+        self._pool: ThreadPoolExecutor | None = None
+
+    def step(self, actions: Numbers) -> tuple[Array, Any, Any, Any, dict[str, Any]]:
+        """Apply torques for one period: see `Environment.step`.
+
+        After an error other than of the actions, KeyboardInterrupt for example, all environments have to be reset.
+
+        Parameters
+        ----------
+        actions : (num_envs, motors) array
+            Torques as fractions of the limits.
+
+        Raises
+        ------
+        InputError
+            Actions of another shape, or that are not finite; no environment has advanced then.
+        gymnasium.error.ResetNeeded, gymnasium.error.ClosedEnvironmentError
+            An episode has not begun, or has ended with autoreset disabled; the environments are closed.
+        """
+        from gymnasium.error import ClosedEnvironmentError, ResetNeeded
+
+        if self.closed:
+            raise ClosedEnvironmentError("the environments are closed; make others")
+        given = _within(actions, (self.num_envs, self.envs[0].limits.size), self.envs[0].motors, "actions")
+        running = [(env, action) for env, action in zip(self.envs, given, strict=True) if env.running]
+        if self.metadata["autoreset_mode"].value == "Disabled" and len(running) < self.num_envs:
+            raise ResetNeeded("an episode has ended, or not begun; call reset()")
+        try:
+            for env, action in running:
+                env.begin_period(action)
+                env.begun = action
+            self._simulate(iter([env for env, _ in running]))
+            return super().step(given)
+        except BaseException:
+            for env in self.envs:
+                env.running = False
+            raise
+
+    def close_extras(self, **_: Any) -> None:
+        """End the threads."""
+        if self._pool is not None:
+            self._pool.shutdown()
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Return the attributes to be copied or pickled, without the threads."""
+        return vars(self) | {"_pool": None}
+
+    def _simulate(self, left: Iterator[Environment]) -> None:
+        """Simulate the periods of environments, each on the thread that is free first."""
+
+        def work() -> None:
+            for env in left:
+                env.simulate_period()
+
+        if self._pool is None and self._others:
+            self._pool = ThreadPoolExecutor(self._others, thread_name_prefix="paraflex-environments")
+        others = [self._pool.submit(work) for _ in range(self._others)] if self._pool else []
+        try:
+            work()
+        finally:
+            # After an error no thread begins with another environment; one that has not begun has nothing left to do.
+            list(left)
+            others = [each for each in others if not each.cancel()]
+            wait(others)
+        for each in others:
+            each.result()
+
+
+def _within(given: Any, shape: tuple[int, ...], motors: Sequence[str], field: str) -> Array:
+    """Return actions of a shape (..., motors), clipped to -1 and 1; raise an `InputError` if they are not finite."""
+    actions = real_numbers(given)
+    if actions is None or actions.shape != shape or not np.isfinite(actions).all():
+        raise InputError(f"not {' x '.join(map(str, shape))} finite numbers", field=field, value=given,
+                         remedy=f"give one from -1 to 1 for each of {', '.join(motors)}")  # fmt: skip
+    return np.minimum(np.maximum(actions, -1.0), 1.0)
 
 
 def _members(mechanism: Mechanism) -> tuple[tuple[str, ...], ...]:
@@ -442,9 +577,10 @@ def register() -> None:
     """Register the environments of the library with Gymnasium unless they are registered already."""
     import gymnasium
 
-    for name, (entry_point, settings) in REGISTERED.items():
+    one, several = "paraflex.library:environment", "paraflex.library:environments"
+    for name, settings in REGISTERED.items():
         if name not in gymnasium.registry:
-            gymnasium.register(name, entry_point=entry_point, kwargs=settings)
+            gymnasium.register(name, entry_point=one, vector_entry_point=several, kwargs=settings)
 
 
 if Env.__module__.startswith("gymnasium"):

@@ -29,7 +29,7 @@ from .method import Family, NativeMethod
 from .native import own, prepare as prepare_native
 from .options import IntegrationOptions, loose_tolerance, refuse_tolerance
 from .pace import Pace, too_slow
-from .run import Instant, Problem, Run, make_problem
+from .run import Problem, Run, make_problem
 from .solution import Solution
 from .watch import Breakdown, excessive_bending, least_norm, open_constraint
 
@@ -230,11 +230,10 @@ class Integration:
             if crossing is not None:
                 self.status, self.message, self._crossing = "stopped", crossing.message, crossing
                 return
-            now = run.now()
-            if self._breaks(now):
+            if self._breaks():
                 return
             if on_progress is not None:
-                on_progress(now.t)
+                on_progress(run.time)
 
     def interrupt(self) -> None:
         """Mark the run as interrupted by the user; the solution so far is kept."""
@@ -284,12 +283,13 @@ class Integration:
             return solution
         raise _failed(self._error(solution))
 
-    def _breaks(self, now: Instant) -> bool:
+    def _breaks(self) -> bool:
         """Return whether the run has broken down, or is too slow."""
         run, options, problem = self.run, self._options, self.run.problem
         # A run advanced in short intervals is checked no more often than one advanced at once.
-        if self._code == FINISHED and run.attempts < self._looked + _SLICE and now.t < problem.times[-1]:
+        if self._code == FINISHED and run.attempts < self._looked + _SLICE and run.time < problem.times[-1]:
             return False
+        now = run.now()
         self._looked = run.attempts
         largest = run.figures().constraint_position_max
         limits = (run.dependent_rows, self._tolerance, options.treatment, largest)

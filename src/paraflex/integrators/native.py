@@ -1,7 +1,9 @@
 """Runs of the compiled schemes: the kernel's time loop in slices."""
 
-from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field, fields
+from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -12,7 +14,7 @@ from paraflex.errors import InputError
 from paraflex.kernel import indices as at
 from paraflex.kernel.linear import factor_system
 from paraflex.kernel.march import march, start
-from paraflex.kernel.packed import Workspace
+from paraflex.kernel.packed import Signals, Workspace
 from paraflex.kernel.run_state import (
     BAUMGARTE,
     FINISHED,
@@ -84,6 +86,8 @@ class NativeRun:
     law: SampledLaw
     dependent_at_start: int
     branch: BranchPose | None
+    # Time at which the run pauses.
+    pause: Array = field(default_factory=lambda: np.full(1, np.inf))
 
     @property
     def dependent_rows(self) -> int:
@@ -120,20 +124,36 @@ class NativeRun:
     def march(self, attempts: int) -> int:
         """Attempt a number of steps and return a code, see `Run`."""
         jumps, now = self.problem.jumps, self.state.clock[at.TIME]
+        stops, pause = self.problem.stops, self.pause[0]
+        if pause < stops[-1]:
+            stops = np.append(stops[: np.searchsorted(stops, pause)], pause)
+        if not jumps.size:
+            return self._time_loop(*self._arguments(self.problem.signals, stops, attempts))
         # The last call may have ended at a jump, with the values before it.
         if np.any(jumps == now):
             self.resume()
             # Steps grow again as from the start: the error estimate of a long step does not contain the effect of a
             # jump.
             self.state.clock[at.STEP] = min(self.state.clock[at.STEP], FIRST_STEP * self.problem.span)
-        stops = self.problem.stops
         ahead = jumps[(jumps > now) & (jumps < stops[-1])]
         if ahead.size:
             stops = stops[stops <= ahead[0]]
-        given = (self.problem.system.packed, self.problem.signals_from(now))
-        arguments = (*given, self.scheme, self.controls, stops, attempts)
-        code = march(*arguments, self.state, self.workspace, self.slow, self.samples, self.law, self.aside)
+        code = march(*self._arguments(self.problem.signals_from(now), stops, attempts))
         return PAUSED if code == FINISHED and ahead.size else code
+
+    def _arguments(self, signals: Signals, stops: Array, attempts: int) -> tuple[Any, ...]:
+        given = (self.problem.system.packed, signals, self.scheme, self.controls, stops, attempts)
+        return (*given, self.state, self.workspace, self.slow, self.samples, self.law, self.aside)
+
+    @cached_property
+    def _time_loop(self) -> Callable[..., int]:
+        """Machine code for the types of this run's data: Numba takes 15 us to look at them."""
+        given = self._arguments(self.problem.signals, self.problem.stops, 0)
+        return march.from_python.compile(tuple(map(march.from_python.typeof_pyval, given)))
+
+    def __getstate__(self) -> dict[str, Any]:
+        """Return the fields to be copied or pickled, without the machine code."""
+        return {each.name: getattr(self, each.name) for each in fields(self)}
 
     @property
     def time(self) -> float:
@@ -169,10 +189,9 @@ class NativeRun:
         )
 
     def until(self, time: float) -> "NativeRun":
-        """Return the same run with a step that ends at a time before its end, where it pauses."""
-        before = self.problem.stops[self.problem.stops < time]
-        self.state.counts[at.STOP] = 0
-        return replace(self, problem=replace(self.problem, stops=np.append(before, time)))
+        """Return the run, after setting the time up to the end at which a step ends and it pauses next."""
+        self.state.counts[at.STOP], self.pause[0] = 0, time
+        return self
 
     def arrays(self) -> tuple[np.ndarray, ...]:
         """Return all arrays of the state of the run, including its samples."""

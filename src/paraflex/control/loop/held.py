@@ -92,7 +92,7 @@ class HeldTorques:
             all_known(torques, self.motors, "torques", "motor")
             torques = [torques.get(name, 0.0) for name in self.motors]
         given = real_numbers(torques)
-        if given is None or given.shape != (len(self.motors),) or not np.all(np.isfinite(given)):
+        if given is None or given.shape != (len(self.motors),) or not np.isfinite(given).all():
             raise InputError(f"not {len(self.motors)} finite numbers", field="torques", value=torques,
                              remedy=f"give one each of {', '.join(self.motors)}")  # fmt: skip
         return self.of_all(given)

@@ -119,8 +119,11 @@ class Readings:
         found = np.empty(len(self.sensors))
         if self.linear:
             found[self.linear] = self.affine.at(now.q, now.v, now.a)
+        marker, position = None, np.zeros(2)
         for place in self.places:
-            found[place.sensor] = place.axis @ marker_position(self.system, place.marker, now.q)
+            if place.marker is not marker:
+                marker, position = place.marker, marker_position(self.system, place.marker, now.q)
+            found[place.sensor] = place.axis @ position
         if self._others:
             given = (now.q[None], now.v[None], now.a[None], now.multipliers[None], torques[None])
             found[self._others] = self._reader(*given)[0]

@@ -94,7 +94,7 @@ class TorqueLog:
     """
 
     def __init__(self, lags: Array, start: float, before: Array) -> None:
-        self._lags, self._start = lags, start
+        self._lags, self._lagging, self._start = lags, bool(np.any(lags)), start
         # Time of each command, torques that acted then, and torques commanded; the first is before the start.
         self._commands: list[tuple[float, Array, Array]] = [(0.0, before, before)]
 
@@ -120,6 +120,8 @@ class TorqueLog:
     def now(self, t: float) -> Array:
         """Return the torques (motors,) that act at a time after the last command."""
         since, begun, commanded = self.last
+        if not self._lagging:
+            return commanded
         return self._relaxed(np.array([t - since]), begun[None], commanded[None])[0]
 
     def at(self, times: Array, slack: float) -> Array:
@@ -142,7 +144,7 @@ class TorqueLog:
 
     def _relaxed(self, since: Array, begun: Array, commanded: Array) -> Array:
         """Return the torques (k, motors) at times (k,) after their commands."""
-        if not np.any(self._lags):
+        if not self._lagging:
             return commanded
         lags = np.where(self._lags > 0.0, self._lags, 1.0)
         left = np.exp(-np.maximum(since, 0.0)[:, None] / lags)

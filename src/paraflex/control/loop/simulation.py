@@ -216,6 +216,12 @@ class Simulation:
             The integration cannot continue, or an event of the options has ended the run; the error carries the run so
             far.
         """
+        self._begin_step(torques, until)
+        self._move(until)
+        return self._end_step()
+
+    def _begin_step(self, torques: Torques, until: float) -> None:
+        """Apply the torques of a step; `_move`, which comes next, may run on another thread."""
         held = self._torques.of_motors(torques)
         if not is_number(until) or not self.time < until <= self.end * (1.0 + SAME):
             raise InputError(f"is not within the rest of the run, {self.time:.6g} to {self.end:.6g} s", field="until",
@@ -223,7 +229,12 @@ class Simulation:
         with self._alone():
             self._use(None)
             self._apply(held)
+
+    def _move(self, until: float) -> None:
+        with self._alone():
             self._march(min(until, self.end))
+
+    def _end_step(self) -> dict[str, float]:
         if self._integration.status == "stopped":
             cause = f"the run has ended: {self._integration.message}"
             raise IntegrationError(cause, None, self.result(), "call result() for what there is, or reset()")
