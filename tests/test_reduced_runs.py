@@ -11,11 +11,13 @@ import scipy.linalg
 
 import paraflex as pf
 from paraflex.dynamics import build_system
+from paraflex.dynamics.completed import Completion
 from paraflex.dynamics.joint_coordinates import joint_coordinate
 from paraflex.dynamics.points import marker_place
 from paraflex.dynamics.sparse import sparse_mass, stiffness_diagonal
 from paraflex.dynamics.state import State, nearest_state
 from paraflex.errors import InputError
+from paraflex.files.profiles import ExpressionProfile
 from paraflex.reduced_bodies import mechanism as reducing
 from paraflex.reduced_bodies.planned import PlannedDeflections
 from paraflex.results import load_results
@@ -415,8 +417,6 @@ def test_the_command_keeps_as_few_as_the_tolerance_allows(tmp_path):
     words = " ".join(done.stdout.split())
     assert f"{kept} of 52 flexible coordinates" in words
     assert "estimated deviation" in words
-    assert "largest stress" not in words
-    assert "stress" not in data
     numbers = json.loads((tmp_path / "r" / "summary.json").read_text())["modes"]["++"]["reduction"]
     assert numbers["estimate"] == deviation
     assert "distance" not in numbers
@@ -448,9 +448,6 @@ def test_sweeps_choose_coordinates_for_the_tolerance_of_each_design(reduced_file
         file.write_text(sweep.format(name, '"tracking_rms"'), encoding="utf-8")
         errors.append(pf.sweep(file, reduced_file / f"auto_{name}", workers=1).data["tracking_rms"].values.ravel())
     assert errors[0] == pytest.approx(errors[1], abs=3e-5)
-    (reduced_file / "stress.toml").write_text(sweep.format("auto.toml", '"stress_max"'), encoding="utf-8")
-    with pytest.raises(InputError, match="metrics: reduced bodies have no stresses"):
-        pf.sweep(reduced_file / "stress.toml", reduced_file / "none", workers=1)
 
 
 def test_wrong_ways_to_ask_for_as_few_as_the_tolerance_allows(tmp_path, task, full):
@@ -473,3 +470,52 @@ def test_wrong_ways_to_ask_for_as_few_as_the_tolerance_allows(tmp_path, task, fu
     assert pf.planned_reduction(pf.plan(rigid, pf.load("five_bar").paths["line"]), 1e-5).mechanism is rigid
     # Nothing finer than all independent shapes.
     assert build_system(pf.planned_reduction(task, 1e-300, modes=["++++"]).mechanism).n_flexible <= 90
+
+
+# --- Stresses ---------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("name", "path", "mode"),
+    [
+        ("raparm_i", "square", "++++"),
+        ("raparm_i", "square", "-+-+"),
+        ("five_bar", "line", "++"),
+        ("3rrr", "circle", "++++++"),
+    ],
+)
+def test_stresses_are_those_of_all_coordinates(name, path, mode):
+    """With curvatures of the kept shapes those of RAParM-I were three times as large."""
+    model = pf.load(name)
+    task = pf.plan(model.mechanism.with_geometry("second-order"), model.paths[path], duration=model.study.duration)
+    options = model.study.integration()
+    few = task.remodelled(pf.reduced_mechanism(task, modes=[mode], deviation=options.tolerance_for(task.system)))
+    data = [pf.tracking_dataset([one.simulate(mode, options=options, warning=False)]) for one in (few, task)]
+    stress, right = (one["stress_max"].max().item() for one in data)
+    assert stress == pytest.approx(right, rel=0.04)
+
+
+def test_stresses_under_weight_and_loads_in_time():
+    model = pf.load("five_bar")
+    load = pf.PointForce("push", model.mechanism.end_effector.point, (ExpressionProfile("40 * t"), -3.0))
+    arm = replace(model.mechanism, gravity=(0.0, -9.81), loads=(load,))
+    task = pf.plan(arm, model.paths["line"])
+    few = task.remodelled(pf.reduced_mechanism(task, modes=["++"], deviation=1e-5))
+    data = [pf.tracking_dataset([one.simulate("++", warning=False)]) for one in (few, task)]
+    stress, right = (one["stress"].max("time").values for one in data)
+    np.testing.assert_allclose(stress, right, atol=0.04 * right.max())
+
+
+def test_completed_motions(task, full):
+    """All coordinates are as they are; under forces that nobody knows they are none."""
+    rng = np.random.default_rng(5)
+    system = task.system
+    found = reducing._directions(system, rng.standard_normal((40, system.n)))
+    same = task.remodelled(replace(task.mechanism, bases=reducing._bases(system, found[: system.n_flexible])))
+    motion = same.simulate("++++", warning=False).solution
+    few = [part[::20] for part in (motion.q, motion.v, motion.a, motion.multipliers)]
+    complete = Completion(same.system)
+    for part, lifted in zip(complete(*few), few, strict=False):
+        np.testing.assert_allclose(part, complete._lifted(lifted), atol=1e-6 * np.abs(part).max())
+    hardest = np.argmax(np.max(np.abs(few[3]), axis=1))
+    assert np.isnan(complete(*few[:3], 1.1 * few[3])[0][hardest]).all()

@@ -41,9 +41,7 @@ _OF_RUNS = {PATH: "runs along a path", MOTION: "runs without a path", STATICS: "
 
 # Metrics of loads that redundant constraints may share, and those that may miss short peaks between samples.
 _SHARED_LOADS = ("drive_torque_max", "drive_power_max", "joint_force_max")
-# Metrics of sections, which beams reduced to the shapes of a motion do not have.
-SECTION_METRICS = ("stress_max", "safety_factor_min", "section_moment_max")
-_LARGEST_LOADS = (*SECTION_METRICS, *_SHARED_LOADS)
+_LARGEST_LOADS = ("stress_max", "safety_factor_min", "section_moment_max", *_SHARED_LOADS)
 # Metrics that are differentiable.
 SMOOTH = tuple(metric.name for metric in METRICS.values() if metric.smooth)
 

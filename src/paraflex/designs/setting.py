@@ -26,7 +26,7 @@ from paraflex.results.dataset import part_of
 from paraflex.results.following import PathPart
 from paraflex.results.metrics import METRICS, MOTION, PATH, STATICS, Members, metric_unit
 from paraflex.validity import implausible_numbers
-from .measure import SECTION_METRICS, metrics_of
+from .measure import metrics_of
 from .own_motion import own_duration
 from .samples import SweptParameter
 from .schema import SweepTable, VaryTable, check_of_statics
@@ -357,12 +357,6 @@ def _check(setting: Setting, model: Model) -> None:
                 field="study.reduced", value=model.study.reduced, source=setting.source,
                 remedy='leave it out, or write reduction = "craig-bampton" and modes in the tables of beams',
             )  # fmt: skip
-    of_sections = [name for name in setting.metrics if name in SECTION_METRICS]
-    if of_sections and model.study.reduced and not setting.statics:
-        raise InputError(
-            "reduced bodies have no stresses, as their shapes suit positions", field="metrics", value=of_sections[0],
-            source=setting.source, remedy="leave it out, or study.reduced",
-        )  # fmt: skip
     model.mechanism.assembly(setting.assembly)
 
 

@@ -18,7 +18,7 @@ between nodes superposed on the results of nodal displacements).
 """
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -27,6 +27,7 @@ from paraflex.arrays import Array
 from paraflex.fem import BeamMesh
 from paraflex.mechanism import AssumedModesBeam, FlexibleBeam, Material, Section
 from paraflex.mechanism.bodies import per_span
+from .completed import Completion
 from .contacts import Contacts, contacts_of
 from .coordinates import BodyCoordinates, piece_rows
 from .inertia_moments import inertia_moments
@@ -91,6 +92,8 @@ class Sections:
         Strength of the material, NaN where it is not known [Pa].
     parts : tuple
         Data of each beam for `loads`.
+    completion : Completion, optional
+        For a system with reduced bodies: `parts` are those with all coordinates.
     """
 
     bodies: tuple[str, ...]
@@ -100,6 +103,7 @@ class Sections:
     modulus: Array
     strength: Array
     parts: "tuple[_Beam, ...]"
+    completion: Completion | None = None
 
     def loads(self, system: System, q: Array, v: Array, a: Array, multipliers: Array) -> SectionLoads:
         """Return the loads of sections for coordinates (k, n), their derivatives, and the multipliers (k, m)."""
@@ -118,6 +122,9 @@ class Sections:
         self, system: System, q: Array, v: Array, a: Array, multipliers: Array
     ) -> "Iterator[tuple[_Beam, SectionLoads]]":
         first = 0
+        if self.completion is not None:
+            q, v, a = self.completion(q, v, a, multipliers)
+            system = self.completion.whole
         for part in self.parts:
             own = slice(first, first := first + len(part.moment))
             sections = tuple(each[own] for each in (self.x, self.area, self.modulus, self.strength))
@@ -157,19 +164,20 @@ class _Beam(NamedTuple):
 def sections_of(system: System) -> Sections | None:
     """Return the stations of a system's flexible beams; None if there are none.
 
-    Rigid and modal bodies have no section forces: their internal structure is not known. Nor have beams reduced to the
-    shapes of a motion, whose curvatures may be wrong by several times although their deflections are right.
+    Rigid and modal bodies have no section forces: their internal structure is not known.
     """
     return system.once("sections", lambda: _sections(system))
 
 
 def _sections(system: System) -> Sections | None:
+    if system.mechanism.bases:
+        completion = Completion(system)
+        found = _sections(completion.whole)
+        return None if found is None else replace(found, completion=completion)
     parts = tuple(
         _stations(described, system)
         for described in system.mechanism.bodies
-        if isinstance(described, FlexibleBeam | AssumedModesBeam)
-        and system.body(described.name).nf
-        and described.name not in system.mechanism.bases
+        if isinstance(described, FlexibleBeam | AssumedModesBeam) and system.body(described.name).nf
     )
     if not parts:
         return None

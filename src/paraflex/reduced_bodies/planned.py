@@ -93,7 +93,8 @@ class PlannedDeflections:
         motion_forces(system.packed, q, v, a, loads, forces, make_scratch(system.packed))
         for motor, torque in zip(system.mechanism.motors, torques.T, strict=True):
             forces -= torque[:, None] * joint_coordinate(system, motor.joint, q).rows
-        return Loading(-forces, np.column_stack([torques, loads]))
+        loads[:, : torques.shape[1]] = torques
+        return Loading(-forces, loads)
 
     def under(self, loading: "Loading") -> Array:
         """Return the static deflections (poses, n) under a loading."""
