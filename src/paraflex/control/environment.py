@@ -303,7 +303,8 @@ class Environment(Env[Array, Numbers]):
         self.observed: tuple[str, ...] = self._observe.names
         self._desired = None if task is None else task.plan.follow(self._times).desired.position
         # Whether an episode is running, its period, and the action of a period that was simulated before `step`.
-        self.running, self._step = False, 0
+        self.running: bool = False
+        self._step = 0
         self.begun: Array | None = None
         self._failure: IntegrationError | None = None
         self._seen: Array = np.zeros(len(self.observed))

@@ -225,7 +225,7 @@ class _Direction(NamedTuple):
     body : str
         Name of the body.
     coordinates : slice
-        Its flexible coordinates u in the system.
+        Flexible coordinates u of the body in the system.
     energies : array
         Product with u that gives the root of energy of a deflection in this direction.
     shape : array

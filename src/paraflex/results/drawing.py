@@ -70,6 +70,9 @@ class DrawnRun:
         Name of the mechanism, and the point of its end-effector if there is one.
     """
 
+    coords: Mapping[str, Any]
+    attrs: Mapping[str, str]
+
     def __init__(self, moving: Mapping[str, Numbers], coords: Mapping[str, Any], attrs: Mapping[str, str]) -> None:
         self._moving, self.coords, self.attrs = moving, coords, attrs
 
