@@ -93,7 +93,7 @@ class Sections:
     parts : tuple
         Data of each beam for `loads`.
     completion : Completion, optional
-        For a system with reduced bodies: `parts` are those with all coordinates.
+        Completion of motions of reduced bodies, whose `parts` are those with all coordinates.
     """
 
     bodies: tuple[str, ...]

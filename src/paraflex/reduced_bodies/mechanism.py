@@ -28,6 +28,8 @@ from .planned import Loading, Owed, PlannedDeflections
 
 # Directions with less than this fraction of the largest root of energy are rounding.
 _ROUNDING = 1e-10
+# Numbers of poses along a path: for a number of coordinates, and for an estimated deviation.
+_POSES, _POSES_OF_ESTIMATE = 12, 6
 # Decompositions, each with weights that follow from the one before.
 _PASSES = 3
 # In place of the number of coordinates: as few as the tolerance allows.
@@ -97,7 +99,7 @@ def reduced_mechanism(
 
 def _along_plan(task: TrackingTask, count: int, modes: Sequence[str | ActuationMode] | None) -> Mechanism:
     _check_flexible(task.system)
-    planned = PlannedDeflections(task)
+    planned = PlannedDeflections(task, _POSES)
     driven = [planned.with_inertia(planned.under(loading)) for loading in _loadings(planned, modes)]
     groups = [_normalised(task.system, driven), planned.with_inertia(planned.of_end_effector())]
     return _with_directions(task.system, groups, count)
@@ -127,7 +129,7 @@ def _from_runs(runs: Sequence[TrackingRun | MotionRun], count: int) -> Mechanism
     groups = [_normalised(systems[0], [run.solution.q for run in runs])]
     for run in runs[:1]:
         if isinstance(run, TrackingRun):
-            planned = PlannedDeflections(run.task)
+            planned = PlannedDeflections(run.task, _POSES)
             groups.append(planned.with_inertia(planned.of_end_effector()))
     return _with_directions(systems[0], groups, count)
 
@@ -185,7 +187,7 @@ def planned_reduction(
                          remedy="give a length in metres, say 1e-5")  # fmt: skip
     if not task.system.n_flexible:
         return Reduction(task.mechanism, task, 0.0, 0.0)
-    planned = PlannedDeflections(task)
+    planned = PlannedDeflections(task, _POSES_OF_ESTIMATE)
     driven = _loadings(planned, modes)
     found, left = _least_missed(task.system, [planned.owed(each) for each in driven], deviation)
     energies = [planned.under(loading) ** 2 @ stiffness_diagonal(task.system) / 2.0 for loading in driven]

@@ -44,8 +44,8 @@ from paraflex.kernel.packed import make_scratch
 from paraflex.mechanism import ActuationMode
 from paraflex.tracking import TrackingTask, undeformed_at
 
-# Number of poses along the path, and largest number of instants whose forces act in each.
-_POSES, _INSTANTS = 12, 4
+# Largest number of instants whose forces act in each pose.
+_INSTANTS = 8
 # Multiple of the mass, relative to the squared lowest frequency of any body: its relative effect on a deflection.
 _FREE = 1e-6
 # Deflections under forces, and twice those under their own inertia.
@@ -57,21 +57,28 @@ _INDEPENDENT = 1e-9
 class PlannedDeflections:
     """Deflections of bodies along a task's planned motion.
 
-    Attributes
+    Parameters
     ----------
     task : TrackingTask
         Task with all flexible coordinates.
+    poses : int
+        Number of poses, evenly spaced along the path without its ends.
+
+    Attributes
+    ----------
+    task : TrackingTask
+        Task.
     samples : list of int
         Numbers of the poses, among the task's sample times.
     """
 
-    def __init__(self, task: TrackingTask) -> None:
+    def __init__(self, task: TrackingTask, poses: int) -> None:
         system, motion, effector = task.system, task.motion, task.mechanism.end_effector
         assert effector is not None
         self.task: TrackingTask = task
         self._motion = undeformed_at(system, motion, list(range(motion.t.size)))
         last = int(np.searchsorted(motion.t, task.path.duration, side="right")) - 1
-        self.samples: list[int] = np.unique(np.linspace(0, last, _POSES + 2).astype(int)[1:-1]).tolist()
+        self.samples: list[int] = np.unique(np.linspace(0, last, poses + 2).astype(int)[1:-1]).tolist()
         places, rows = marker_place(system, system.marker(effector.point), self._motion[0])
         self._rows: Array = rows[self.samples]
         travel = float(np.sum(np.linalg.norm(np.diff(places, axis=0), axis=1)))
@@ -219,8 +226,8 @@ class _Structure:
         elastic = stiffness_diagonal(system)
         self._mass = sparse_mass(system, q)
         self._stiffness = elastic_stiffness(system, q, every_spring=True)
-        self._jacobian = sparse_jacobian(system, q)
-        self._rigid = elastic == 0.0
+        self._jacobian = Sparse(system.jacobian(q)) if system.n <= DENSE_COORDINATES else sparse_jacobian(system, q)
+        self._rigid, self._m = elastic == 0.0, system.m
         typical = typical_square(elastic, self._stiffness, self._mass)
         # All vibrations of a mechanism that is not large, with x^T K x = 1, and its free motions of unit mass.
         self._modes: tuple[Array, Array] | None = None
@@ -243,7 +250,7 @@ class _Structure:
         return self._displacements(forces - self._little * self.inertia(self._displacements(forces)))
 
     def _displacements(self, forces: Array) -> Array:
-        return self._saddle.solve(forces.T, np.zeros((self._jacobian.shape[0], len(forces))))[0].T
+        return self._saddle.solve(forces.T, np.zeros((self._m, len(forces))))[0].T
 
     def inertia(self, displacements: Array) -> Array:
         """Return the products of displacements with the mass matrix."""
