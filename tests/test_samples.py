@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import importlib
 import json
 import re
@@ -145,3 +146,26 @@ torque = "exp(-((t - 43.21) / 0.001)^2)"
     assert float(re.search(r"and (\S+) N m at t = 43.21 s", found.text).group(1)) == pytest.approx(1.0, rel=0.01)
     number = int(re.search(r"samples = (\d+)", found.remedy).group(1))
     assert 1e5 < number < 1e6
+
+
+def test_loads_between_samples_are_computed_when_somebody_asks(monkeypatch, tmp_path):
+    from paraflex.integrators import integration
+
+    asked = []
+    compute = integration.samples_too_few
+    monkeypatch.setattr(integration, "samples_too_few", lambda *given: asked.append(1) or compute(*given))
+    solution = pf.load("five_bar").plan().simulate("++", warning=False).solution
+    assert not asked
+    found = copy.deepcopy(solution).findings
+    assert len(asked) == 1
+    assert isinstance(found, tuple)
+    assert solution.findings == found
+    assert solution.findings == solution.findings
+    assert repr(solution.findings) == repr(found)
+    assert len(asked) == 1
+    (tmp_path / "sweep.toml").write_text(
+        'mechanism = "five_bar"\npaths = ["line"]\nmetrics = ["tracking_rms"]\n[vary.thickness]\n'
+        'fields = ["section.bar.thickness"]\nvalues = [0.004, 0.006]\n'
+    )
+    pf.sweep(tmp_path / "sweep.toml", tmp_path / "out", workers=1)
+    assert len(asked) == 1

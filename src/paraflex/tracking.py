@@ -530,7 +530,7 @@ def _joined(driven: Solution, held: Solution, samples: int, multipliers: Array, 
         brake_energy=energy,
         # Locked joints have rows that the run does not have.
         multiplier_errors=driven.multiplier_errors,
-        findings=driven.findings + tuple(one for one in held.findings if one.place not in known),
+        findings=(*driven.findings, *(one for one in held.findings if one.place not in known)),
     )
 
 

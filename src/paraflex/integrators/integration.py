@@ -2,7 +2,7 @@
 
 import copy
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import fields, replace
 from typing import Any, NamedTuple
 
@@ -14,6 +14,7 @@ from paraflex.dynamics import State, System, dependence
 from paraflex.dynamics.change_points import dependent_drives
 from paraflex.dynamics.rank import DENSE_ROWS
 from paraflex.errors import ConstraintDriftError, IntegrationError, Moment, SingularPositionError, SliderOffBeamError
+from paraflex.findings import Finding
 from paraflex.kernel.packed import Signals
 from paraflex.kernel.run_state import ERROR_TEST, FINISHED, LAW_FAILED, NO_CONVERGENCE, NOT_FINITE, PAUSED
 from paraflex.kernel.sampled import SampledLaw, no_law
@@ -30,7 +31,7 @@ from .native import own, prepare as prepare_native
 from .options import IntegrationOptions, loose_tolerance, refuse_tolerance
 from .pace import Pace, too_slow
 from .run import Problem, Run, make_problem
-from .solution import Solution
+from .solution import LateFindings, Solution
 from .watch import Breakdown, excessive_bending, least_norm, open_constraint
 
 # Attempted steps between two checks: some milliseconds for a dozen bodies.
@@ -271,10 +272,15 @@ class Integration:
         elapsed = time.perf_counter() - self._began
         whole = _solution(run, options, elapsed, self.status, self.message, self._crossing)
         solution = whole if self._between is None else self._between.kept(whole)
-        few = samples_too_few(system, whole, solution, self._samples) if self._samples else None
-        mesh = elements_too_few(system, run.problem.limits)
-        findings = (*self._ends.findings(solution.q), *filter(None, [self._loose, few]), *mesh)
-        solution = replace(solution, findings=findings)
+        known = (*self._ends.findings(solution.q), *filter(None, [self._loose]))
+        mesh, samples, kept = elements_too_few(system, run.problem.limits), self._samples, solution
+
+        def findings() -> Iterator[Finding]:
+            # Loads between samples take as long to compute as a tenth of a run, and studies of many runs rarely ask.
+            few = samples_too_few(system, whole, kept, samples) if samples else None
+            yield from (*known, *filter(None, [few]), *mesh)
+
+        solution = replace(solution, findings=LateFindings(findings))
         end = None if self._crossing is None else self._crossing.function.event
         if self._crossing is not None and isinstance(end, BeamEnd) and end.at_end is AtEnd.ERROR:
             moment = Moment(self._crossing.t, solution.steps)

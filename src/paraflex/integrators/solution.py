@@ -3,14 +3,55 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from threading import Lock
+from typing import TYPE_CHECKING, Any, overload
 
 from paraflex.arrays import Array, Indices
 from paraflex.findings import Finding
 
 if TYPE_CHECKING:
     from .options import IntegrationOptions
+
+
+class LateFindings(Sequence[Finding]):
+    """Findings that are computed when they are asked for first, by a function; a tuple where they are copied."""
+
+    def __init__(self, find: Callable[[], Iterable[Finding]]) -> None:
+        self._find: Callable[[], Iterable[Finding]] | None = find
+        self._found: tuple[Finding, ...] = ()
+        self._lock = Lock()
+
+    def _all(self) -> tuple[Finding, ...]:
+        with self._lock:
+            if self._find is not None:
+                self._found, self._find = tuple(self._find()), None
+        return self._found
+
+    @overload
+    def __getitem__(self, index: int) -> Finding: ...
+
+    @overload
+    def __getitem__(self, index: slice) -> tuple[Finding, ...]: ...
+
+    def __getitem__(self, index: int | slice) -> Finding | tuple[Finding, ...]:
+        return self._all()[index]
+
+    def __len__(self) -> int:
+        return len(self._all())
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, Sequence) and self._all() == tuple(other)
+
+    def __hash__(self) -> int:
+        return hash(self._all())
+
+    def __repr__(self) -> str:
+        return repr(self._all())
+
+    def __reduce__(self) -> tuple[type[tuple[Any, ...]], tuple[tuple[Finding, ...]]]:
+        return tuple, (self._all(),)
 
 
 @dataclass(frozen=True)
@@ -57,7 +98,7 @@ class Solution:
         controlled by such errors.
     brake_energy : float
         Kinetic energy absorbed by brakes as they engaged [J]: `work` is reduced by it from then on.
-    findings : tuple of Finding
+    findings : sequence of Finding
         Reasons for doubt about the solution, such as points that left their beams.
     resting : bool
         Whether the samples are equilibria, numbered in place of times.
@@ -91,7 +132,7 @@ class Solution:
     event: str = ""
     multiplier_errors: Array | None = None
     brake_energy: float = 0.0
-    findings: tuple[Finding, ...] = ()
+    findings: Sequence[Finding] = ()
     resting: bool = False
     acting: Indices | None = None
     options: IntegrationOptions | None = None
