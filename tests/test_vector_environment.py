@@ -175,8 +175,8 @@ def test_generators_are_those_of_the_environments():
 def test_without_gymnasium_the_extra_is_named(monkeypatch):
     for name in ("gymnasium", "gymnasium.vector"):
         monkeypatch.setitem(sys.modules, name, None)
-    monkeypatch.delitem(sys.modules, "paraflex.control.environment")
-    without = importlib.import_module("paraflex.control.environment")
+    monkeypatch.delitem(sys.modules, "paraflex.control.vector_environment")
+    without = importlib.import_module("paraflex.control.vector_environment")
     with pytest.raises(pf.InputError, match=r"VectorEnvironment: .* Gymnasium, .*; pip install 'paraflex\[gym\]'"):
         without.VectorEnvironment(rotor(), 2, **ROTOR)
 

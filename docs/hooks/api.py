@@ -52,6 +52,7 @@ PACKAGES = (
     "control.shaping.shapers",
     "control.shaping.shaped",
     "control.environment",
+    "control.vector_environment",
     "equilibria",
     "integrators.methods",
     "integrators",

@@ -135,7 +135,8 @@ from .control.design.closed_loops import (
     ClosedLoop as ClosedLoop,
 )
 from .control.design.margins import margins as margins, Margins as Margins
-from .control.environment import Environment as Environment, VectorEnvironment as VectorEnvironment
+from .control.environment import Environment as Environment
+from .control.vector_environment import VectorEnvironment as VectorEnvironment
 
 # Studies
 from .campaign import Workers as Workers

@@ -10,7 +10,8 @@ from .mechanism.raparm import raparm_i
 from .mechanism.rows import chain_of_segments, four_bars_in_a_row
 
 if TYPE_CHECKING:
-    from .control.environment import Environment, VectorEnvironment
+    from .control.environment import Environment
+    from .control.vector_environment import VectorEnvironment
 
 __all__ = ["chain_of_segments", "environment", "environments", "four_bars_in_a_row", "names", "raparm_i", "text"]
 
@@ -37,6 +38,6 @@ def environment(name: str = "raparm_i", **settings: Any) -> Environment:
 
 def environments(name: str = "raparm_i", num_envs: int = 1, **settings: Any) -> VectorEnvironment:
     """Return `num_envs` environments of a library mechanism as one: see `environment` and `pf.VectorEnvironment`."""
-    from .control.environment import VectorEnvironment
+    from .control.vector_environment import VectorEnvironment
 
     return VectorEnvironment(plan(load(name)), num_envs, **settings)

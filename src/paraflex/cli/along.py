@@ -107,11 +107,11 @@ def requested_tasks(
     if request.segments is not None:
         return task.in_segments(proportional_segments(mechanism, request.segments)), None, None
     kept = kept_coordinates(request, model.study)
-    if kept is None or (kept == AUTO and not task.system.n_flexible):
+    if kept is None:
         return task, None, None
     with locating_reduction(request):
         few, reduction = reduced_task(task, kept, options.tolerance_for(task.system), modes)
-    return few, task if reduction is None else None, reduction
+    return few, None if kept == AUTO else task, reduction
 
 
 def _run(request: RunRequest, model: Model, planned: Sequence[_Along], fidelity: str, began: float) -> int:

@@ -20,6 +20,7 @@ from paraflex.kernel.stage import equations
 from .inputs import inputs_of
 from .joint_coordinates import joint_coordinate
 from .signals import moment_signals
+from .state import carried
 from .system import System, build_system
 
 # Forces that are missing in the equations of the reduced bodies, relative to the largest on a body, above which a
@@ -39,18 +40,16 @@ class Completion:
     def __init__(self, system: System) -> None:
         self._few = system
         self.whole: System = build_system(replace(system.mechanism, bases={}))
-        pairs = zip(self.whole.bodies, system.bodies, strict=True)
-        self._shapes = [here.modes.vectors.T @ here.shape.integrals.Mff @ there.modes.vectors for here, there in pairs]
 
     def __call__(self, q: Array, v: Array, a: Array, multipliers: Array) -> tuple[Array, Array, Array]:
         """Return coordinates (k, all) and derivatives of a motion (k, n) with multipliers (k, m).
 
         They are NaN at instants at which other forces than those of motors and loads act.
         """
-        q_all, v_all, a_all = (self._lifted(part) for part in (q, v, a))
+        q_all, v_all, a_all = (carried(self.whole, self._few, part) for part in (q, v, a))
         forces, ways = _forces(self._few, q, v, a, multipliers)
         others, other_ways = _forces(self.whole, q_all, v_all, a_all, multipliers)
-        acting = -np.einsum("kna,kn->ka", np.linalg.pinv(np.swapaxes(ways, 1, 2)).swapaxes(1, 2), forces)
+        acting = -np.einsum("kan,kn->ka", np.linalg.pinv(ways.swapaxes(1, 2)), forces)
         left = forces + np.einsum("kan,ka->kn", ways, acting)
         bodies = np.zeros_like(q)
         motion_forces(
@@ -63,13 +62,6 @@ class Completion:
                 q_all[:, body.flexible] -= left[:, body.flexible] / body.modes.omega**2
         q_all[~balanced] = np.nan
         return q_all, v_all, a_all
-
-    def _lifted(self, part: Array) -> Array:
-        out = np.zeros((len(part), self.whole.n))
-        for here, there, shapes in zip(self.whole.bodies, self._few.bodies, self._shapes, strict=True):
-            out[:, here.offset : here.offset + 3] = part[:, there.offset : there.offset + 3]
-            out[:, here.flexible] = part[:, there.flexible] @ shapes.T
-        return out
 
 
 def _forces(system: System, q: Array, v: Array, a: Array, multipliers: Array) -> tuple[Array, Array]:

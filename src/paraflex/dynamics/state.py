@@ -82,6 +82,19 @@ def undeformed_motion(system: System, rigid: System, q: Array, v: Array, a: Arra
     return there[0], there[1], there[2]
 
 
+def carried(system: System, other: System, coordinates: Array) -> Array:
+    """Return coordinates (k, n) for those (k, others) of another system of the same bodies, or their derivatives.
+
+    Deflections have the least mass-weighted difference; constraints may be violated.
+    """
+    out = np.zeros((len(coordinates), system.n))
+    for here, there in zip(system.bodies, other.bodies, strict=True):
+        shapes = here.modes.vectors.T @ here.shape.integrals.Mff @ there.modes.vectors
+        out[:, here.offset : here.offset + 3] = coordinates[:, there.offset : there.offset + 3]
+        out[:, here.flexible] = coordinates[:, there.flexible] @ shapes.T
+    return out
+
+
 def nearest_state(system: System, other: System, state: State) -> State:
     """Return the state nearest to that of another system of the same bodies with other flexible coordinates.
 
@@ -92,12 +105,8 @@ def nearest_state(system: System, other: System, state: State) -> State:
     AssemblyError, InconsistentConstraintsError
         The constraints cannot be satisfied near the state.
     """
-    signals, (q, v) = moment_signals(system.mechanism, state.time), np.zeros((2, system.n))
-    for here, there in zip(system.bodies, other.bodies, strict=True):
-        shapes = here.modes.vectors.T @ here.shape.integrals.Mff @ there.modes.vectors
-        for mine, theirs in ((q, state.q), (v, state.v)):
-            mine[here.offset : here.offset + 3] = theirs[there.offset : there.offset + 3]
-            mine[here.flexible] = shapes @ theirs[there.flexible]
+    signals = moment_signals(system.mechanism, state.time)
+    q, v = carried(system, other, np.array([state.q, state.v]))
     q = project_position(system, signals, state.time, q)
     return State(state.time, q, project_velocity(system, signals, state.time, q, v))
 

@@ -4,8 +4,8 @@ Deflections u of a body, in modes of unit mass and frequencies omega, have the s
 singular value decomposition of omega u over all deflections gives directions and their shares of the energy (proper
 orthogonal decomposition). The directions with the largest shares are kept, over all bodies together.
 
-Of a planned motion no run is needed: see `planned`. Its deflections are weighted such that the shares of the directions
-left out, summed up, estimate what the end-effector's position misses.
+Deflections of a planned motion need no run: see `planned`. If they are weighted by the errors of the end-effector's
+position that their omission causes, the shares of the omitted directions add up to an estimate of this error.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from paraflex.errors import ActuationError, InputError, SingularActuationError
 from paraflex.mechanism import ActuationMode, Mechanism, mode_of_motors
 from paraflex.motion import MotionRun
 from paraflex.tracking import TrackingRun, TrackingTask
-from .planned import Loading, Owed, PlannedDeflections
+from .planned import Contributions, Loading, PlannedDeflections
 
 # Directions with less than this fraction of the largest root of energy are rounding.
 _ROUNDING = 1e-10
@@ -143,9 +143,14 @@ def _with_directions(system: System, groups: Sequence[Array], count: int) -> Mec
 def reduced_task(
     task: TrackingTask, reduced: int | str, tolerance: float, modes: Sequence[str | ActuationMode] | None
 ) -> tuple[TrackingTask, Reduction | None]:
-    """Return the task with a number of coordinates, or with `AUTO` as few as a tolerance allows [m], estimated."""
+    """Return the task with a number of coordinates, or with `AUTO` as few as a tolerance allows [m].
+
+    `AUTO` does not change a task of rigid bodies; otherwise it also returns the reduction with its estimate.
+    """
     if reduced != AUTO:
         return task.remodelled(reduced_mechanism(task, int(reduced), modes=modes)), None
+    if not task.system.n_flexible:
+        return task, None
     reduction = planned_reduction(task, tolerance, modes=modes)
     return task.remodelled(reduction.mechanism), reduction
 
@@ -189,31 +194,34 @@ def planned_reduction(
         return Reduction(task.mechanism, task, 0.0, 0.0)
     planned = PlannedDeflections(task, _POSES_OF_ESTIMATE)
     driven = _loadings(planned, modes)
-    found, left = _least_missed(task.system, [planned.owed(each) for each in driven], deviation)
+    found, left = _fewest_directions(task.system, [planned.contributions(each) for each in driven], deviation)
     energies = [planned.under(loading) ** 2 @ stiffness_diagonal(task.system) / 2.0 for loading in driven]
     mechanism = replace(task.mechanism, bases=_bases(task.system, found))
     return Reduction(mechanism, task, left, float(np.max(energies)))
 
 
-def _least_missed(system: System, modes: Sequence[Owed], deviation: float) -> tuple[list[_Direction], float]:
+def _fewest_directions(
+    system: System, modes: Sequence[Contributions], deviation: float
+) -> tuple[list[_Direction], float]:
     """Return the fewest directions with an estimated deviation in all modes, and their largest one [m].
 
-    What a deflection misses counts with its slope up to its cap: shapes for a vibration that is not kept in phase in
-    any case are better spent on others. The weights of the decomposition follow from the directions kept before.
+    The error due to a deflection is limited by its cap: further shapes for a vibration that cannot be kept in phase are
+    of little use. The weights of each decomposition are therefore the slopes between zero and the errors that remain
+    with the directions of the one before.
     """
-    owed = Owed(*(np.concatenate(parts) for parts in zip(*modes, strict=True)))
+    every = Contributions(*(np.concatenate(parts) for parts in zip(*modes, strict=True)))
     begins = np.cumsum([0, *(one.slopes.size for one in modes[:-1])])
-    weights, kept, left = owed.slopes, [], 0.0
+    weights, kept, left = every.slopes, [], 0.0
     for _ in range(_PASSES):
-        found = _directions(system, np.sqrt(weights)[:, None] * owed.deflections)
-        roots = np.array([owed.deflections[:, one.coordinates] @ one.energies for one in found]).T
+        found = _directions(system, np.sqrt(weights)[:, None] * every.deflections)
+        roots = np.array([every.deflections[:, one.coordinates] @ one.energies for one in found]).T
         parts = np.cumsum(np.column_stack([np.zeros(len(roots)), roots**2]), axis=1)
         parts = np.maximum(0.0, parts[:, -1:] - parts)
-        each = np.add.reduceat(np.minimum(owed.slopes[:, None] * parts, owed.caps[:, None]), begins, axis=0)
+        each = np.add.reduceat(np.minimum(every.slopes[:, None] * parts, every.caps[:, None]), begins, axis=0)
         missed = np.max(each, axis=0)
         kept = found[: min(max(1, int(np.argmax(missed <= deviation))), _independent(found))]
         left = float(missed[len(kept)])
-        weights = np.minimum(owed.slopes, owed.caps / np.maximum(parts[:, len(kept)], np.finfo(float).tiny))
+        weights = np.minimum(every.slopes, every.caps / np.maximum(parts[:, len(kept)], np.finfo(float).tiny))
     return kept, left
 
 

@@ -1,4 +1,4 @@
-"""Deflections of bodies along a planned motion, weighted by what the end-effector's position owes to them.
+"""Deflections of bodies along a planned motion, and the errors of the end-effector's position without them.
 
 At an instant of the rigid motion the forces f = -(M a + h) of inertia, loads and motors are in balance. They deflect
 the mechanism, undeformed in its nominal pose, by x, the sum of phi (phi^T f) / omega^2 over the elastic vibrations of
@@ -125,12 +125,12 @@ class PlannedDeflections:
             self._structures, statics.reshape(len(self.samples), -1, statics.shape[1]), strict=True
         ):
             inertia = structure.inertia(x)
-            moving, bent = np.sum(x * inertia, axis=1), structure.energy_roots(x) ** 2
-            squares = np.divide(bent, moving, out=np.zeros_like(bent), where=moving > 0.0)
+            moving, stored = np.sum(x * inertia, axis=1), structure.energy_roots(x) ** 2
+            squares = np.divide(stored, moving, out=np.zeros_like(stored), where=moving > 0.0)
             second.append(squares[:, None] * structure.static_displacements(inertia))
         return np.concatenate([statics, *second])
 
-    def owed(self, loading: "Loading") -> "Owed":
+    def contributions(self, loading: "Loading") -> "Contributions":
         """Return deflections under a loading, and vibrations by it, with the deviations that they cause."""
         times = self.task.motion.t
         # Between two poses the forces act in the nearer one.
@@ -149,11 +149,11 @@ class PlannedDeflections:
             units, omega = structure.vibrations(np.concatenate([statics, at_effector]))
             vibrating = _vibrating(times, loading.forces @ units.T, omega)
             swing = np.linalg.norm(rows @ units.T, axis=0) * vibrating
-            found.append(Owed(units, swing * omega * (times[-1] - times[0]) / 2.0, 2.0 * swing))
+            found.append(Contributions(units, swing * omega * (times[-1] - times[0]) / 2.0, 2.0 * swing))
             pushed = np.linalg.norm(rows @ free.T, 2) * half * vibrating**2 / (2.0 * self._length)
-            found.append(Owed(units, pushed, pushed))
+            found.append(Contributions(units, pushed, pushed))
         deflections, slopes, caps = (np.concatenate(parts) for parts in zip(*found, strict=True))
-        return Owed(deflections, slopes / len(self._structures), caps / len(self._structures))
+        return Contributions(deflections, slopes / len(self._structures), caps / len(self._structures))
 
     def _tangent_stiffness(self, sample: int, loading: "Loading", structure: "_Structure") -> Sparse:
         """Return the derivative (n, n) of the equations of motion by the coordinates, at constant multipliers."""
@@ -162,7 +162,7 @@ class PlannedDeflections:
         point = MotionPoint(float(self.task.motion.t[sample]), q, v, a, lam, loading.acting[sample])
         return self._tangency.stiffness(point)
 
-    def _products(self, statics: Array, others: Array, number: int) -> "Owed":
+    def _products(self, statics: Array, others: Array, number: int) -> "Contributions":
         """Return deflections (k, n) and (l, n) body by body, for the mean of the products of each with all others."""
         found = []
         for body in self.task.system.bodies:
@@ -171,10 +171,10 @@ class PlannedDeflections:
                 part[:, body.flexible] = each[:, body.flexible]
             sizes = [np.sqrt(part[:, body.flexible] ** 2 @ body.modes.omega**2) for part in parts]
             for part, own, partners in zip(parts, sizes, sizes[::-1], strict=True):
-                bent = own > 0.0
-                slopes = own[bent] * np.sum(partners) / (2.0 * number)
-                found.append(Owed(part[bent] / own[bent, None], slopes, slopes))
-        return Owed(*(np.concatenate(parts) for parts in zip(*found, strict=True)))
+                nonzero = own > 0.0
+                slopes = own[nonzero] * np.sum(partners) / (2.0 * number)
+                found.append(Contributions(part[nonzero] / own[nonzero, None], slopes, slopes))
+        return Contributions(*(np.concatenate(parts) for parts in zip(*found, strict=True)))
 
 
 def _vibrating(times: Array, forces: Array, omega: Array) -> Array:
@@ -203,8 +203,8 @@ class Loading(NamedTuple):
     acting: Array
 
 
-class Owed(NamedTuple):
-    """Deflections, and what the end-effector's position owes to them.
+class Contributions(NamedTuple):
+    """Deflections, and the deviations of the end-effector that their omission causes.
 
     Attributes
     ----------
