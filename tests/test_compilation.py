@@ -9,6 +9,7 @@ import numpy as np
 
 import processes
 from paraflex.compilation import are_compiled, compile_kernels
+from paraflex.kernel.compiling import kernel
 from paraflex.kernel.plain import TESTED, VARIABLE, choose
 
 # Calls what is compiled beforehand, then a study; prints what the study had to compile besides.
@@ -96,6 +97,19 @@ def test_what_is_loaded_before_changes_no_bit():
     before, result = python("-c", RUN, "all").split()
     assert (int(nothing), int(before) >= 6) == (0, True)
     assert result == expected
+
+
+def test_kernels_do_not_count_indices_from_the_end_but_functions_of_users_do():
+    def of_a_user(x, i):
+        return x[i]
+
+    def of_a_kernel(x, i):
+        return x[i]
+
+    numbers = np.arange(6.0)
+    of_a_kernel.__module__ = "paraflex.kernel.arrays"
+    assert kernel(of_a_user)(numbers[3:], -1) == numbers[5]
+    assert kernel(of_a_kernel)(numbers[3:], -1) == numbers[2]
 
 
 def test_plain_numba_finds_the_same_and_loads_none_of_our_changes(tmp_path):

@@ -21,15 +21,14 @@ def place_sums(system, i, q, v, a, points):
 
 
 @inlined
-def second_order_equations(system, i, q, v, a, f, points):
-    """Compute M q'' + h + K u of body i, less its weight, into f.
+def second_order_equations(system, i, c, s, q, v, a, f, points):
+    """Compute M q'' + h + K u of body i, less its weight, into f; c and s rotate its frame.
 
     Axial inertia forces at Gauss points are left in points.axial.
     """
     body = system.bodies[i]
     o, n, pitch = body.offset, body.nf, body.pitch
     e = o + 3
-    c, s = cos(q[o + 2]), sin(q[o + 2])
     w, dw = v[o + 2], a[o + 2]
     gx, gy = a[o] - system.gravity[0], a[o + 1] - system.gravity[1]
     ax, ay = c * gx + s * gy, c * gy - s * gx
@@ -138,6 +137,7 @@ def second_order_mass(system, i, q, work, points):
     """
     body = system.bodies[i]
     n, width, at, pitch = body.nf, 3 + body.nf, body.dense, body.pitch
+    stride = padded(width)
     place_sums(system, i, q, q, q, points)
     m, first_x, first_y, second = zeros(), zeros(), zeros(), zeros()
     for block in range(0, pitch, LANES):
@@ -149,16 +149,16 @@ def second_order_mass(system, i, q, work, points):
         first_x, first_y = add_product(first_x, mass, sx), add_product(first_y, mass, sy)
         second = add_product(second, mass, add_product(add_product(zeros(), sx, sx), sy, sy))
         second = add_scaled(second, inertia, 1.0)
-    for j in range(width * width):
+    for j in range(width * stride):
         work.mass[at + j] = 0.0
-    work.mass[at] = work.mass[at + width + 1] = summed(m)
-    work.mass[at + 2 * width], work.mass[at + 2 * width + 1] = -summed(first_y), summed(first_x)
-    work.mass[at + 2 * width + 2] = summed(second)
+    work.mass[at] = work.mass[at + stride + 1] = summed(m)
+    work.mass[at + 2 * stride], work.mass[at + 2 * stride + 1] = -summed(first_y), summed(first_x)
+    work.mass[at + 2 * stride + 2] = summed(second)
     for l in range(n):
         second_order_mass_row(system, i, l, work.mass, points)
     for r in range(width):
         for d in range(r):
-            work.mass[at + d * width + r] = work.mass[at + r * width + d]
+            work.mass[at + d * stride + r] = work.mass[at + r * stride + d]
 
 
 @inlined
@@ -168,8 +168,8 @@ def second_order_mass_row(system, i, l, mass, points):
     On entry points.shares holds s_x of the points, and points.q holds s_y.
     """
     body = system.bodies[i]
-    pitch, width = body.pitch, 3 + body.nf
-    row, place = body.dense + (3 + l) * width, body.places + 3 * pitch * l
+    pitch = body.pitch
+    row, place = body.dense + (3 + l) * padded(3 + body.nf), body.places + 3 * pitch * l
     mx, my, lever = zeros(), zeros(), zeros()
     for block in range(0, pitch, LANES):
         x, y = load(system.places, place + block), load(system.places, place + pitch + block)
@@ -208,8 +208,9 @@ def note_axial_forces(system, i, q, v, a, lam, work, points, geometric):
     """
     body = system.bodies[i]
     n, at, pitch = body.nf, body.square, body.pitch
+    c, s = cos(q[body.offset + 2]), sin(q[body.offset + 2])
     # Only the axial forces at the Gauss points are used.
-    second_order_equations(system, i, q, v, a, work.f, points)
+    second_order_equations(system, i, c, s, q, v, a, work.f, points)
     for j in range(body.slopes, pitch):
         points.axial[j] = 0.0
     for l in range(n):
@@ -220,7 +221,6 @@ def note_axial_forces(system, i, q, v, a, lam, work, points, geometric):
                 bent = add_product(zeros(), load(system.places, slopes + block), load(system.places, other + block))
                 total = add_product(total, load(points.axial, block), bent)
             geometric[at + l * n + d] = -summed(total)
-    c, s = cos(q[body.offset + 2]), sin(q[body.offset + 2])
     for k in range(body.port, body.port_end):
         port = system.ports[k]
         bending = system.markers[port.marker].bending
@@ -264,18 +264,19 @@ def linear_mass(system, i, work):
     """Compute the mass matrix of body i of linear geometry into work.mass, from the data of `factor.factor_body`."""
     body = system.bodies[i]
     n, k, width, at = body.nf, body.flex, 3 + body.nf, body.dense
+    stride = padded(width)
     sx, sy, inertia = work.frame[i, 2], work.frame[i, 3], work.frame[i, 4]
-    for j in range(width * width):
+    for j in range(width * stride):
         work.mass[at + j] = 0.0
-    work.mass[at] = work.mass[at + width + 1] = body.m
-    work.mass[at + 2], work.mass[at + width + 2], work.mass[at + 2 * width + 2] = -sy, sx, inertia
+    work.mass[at] = work.mass[at + stride + 1] = body.m
+    work.mass[at + 2], work.mass[at + stride + 2], work.mass[at + 2 * stride + 2] = -sy, sx, inertia
     for j in range(n):
-        work.mass[at + 3 + j], work.mass[at + width + 3 + j] = system.modal[S2X, k + j], system.modal[S2Y, k + j]
-        work.mass[at + 2 * width + 3 + j] = work.flex[MPF, k + j]
-        work.mass[at + (3 + j) * (width + 1)] = 1.0
+        work.mass[at + 3 + j], work.mass[at + stride + 3 + j] = system.modal[S2X, k + j], system.modal[S2Y, k + j]
+        work.mass[at + 2 * stride + 3 + j] = work.flex[MPF, k + j]
+        work.mass[at + (3 + j) * (stride + 1)] = 1.0
     for r in range(3):
         for d in range(r + 1, width):
-            work.mass[at + d * width + r] = work.mass[at + r * width + d]
+            work.mass[at + d * stride + r] = work.mass[at + r * stride + d]
 
 
 @routine
@@ -289,16 +290,16 @@ def factor_dense_body(system, i, b, q, work, dense):
     if dense is None or body.full == 0:
         return False
     n, width, at = body.nf, 3 + body.nf, body.dense
-    g = sqrt(b)
+    stride, g = padded(width), sqrt(b)
     if body.slopes > 0:
         second_order_mass(system, i, q, work, work.scratch.points)
     else:
         linear_mass(system, i, work)
     for attempt in range(2):
-        for j in range(width * width):
+        for j in range(width * stride):
             work.dense[at + j] = work.mass[at + j]
         for l in range(n):
-            r = at + (3 + l) * width + 3
+            r = at + (3 + l) * stride + 3
             work.dense[r + l] += b * system.modal[OMEGA2, body.flex + l] + g * system.modal[DAMPING, body.flex + l]
             if body.damping >= 0:
                 for d in range(l + 1):
@@ -309,16 +310,16 @@ def factor_dense_body(system, i, b, q, work, dense):
         definite = True
         for r in range(width):
             for d in range(r + 1):
-                total = work.dense[at + r * width + d]
+                total = work.dense[at + r * stride + d]
                 for k in range(d):
-                    total -= work.dense[at + r * width + k] * work.dense[at + d * width + k]
+                    total -= work.dense[at + r * stride + k] * work.dense[at + d * stride + k]
                 if d < r:
-                    work.dense[at + r * width + d] = total * work.dense[at + d * width + d]
+                    work.dense[at + r * stride + d] = total * work.dense[at + d * stride + d]
                 elif total > 0.0:
-                    work.dense[at + r * width + r] = 1.0 / sqrt(total)
+                    work.dense[at + r * stride + r] = 1.0 / sqrt(total)
                 else:
                     definite = False
-                    work.dense[at + r * width + r] = 0.0
+                    work.dense[at + r * stride + r] = 0.0
         if definite:
             break
     return True
@@ -328,16 +329,17 @@ def factor_dense_body(system, i, b, q, work, dense):
 def solve_dense(system, i, dense, source, target, at, pitch):
     """Multiply eight columns of a matrix, from `at` on and with rows `pitch` apart, by (M + b (K + K_g))^-1."""
     width, first = 3 + system.bodies[i].nf, system.bodies[i].dense
+    stride = padded(width)
     for r in range(width):
         total = load(source, at + r * pitch)
         for k in range(r):
-            total = add_scaled(total, load(target, at + k * pitch), -dense[first + r * width + k])
-        store(target, at + r * pitch, add_scaled(zeros(), total, dense[first + r * width + r]))
+            total = add_scaled(total, load(target, at + k * pitch), -dense[first + r * stride + k])
+        store(target, at + r * pitch, add_scaled(zeros(), total, dense[first + r * stride + r]))
     for r in range(width - 1, -1, -1):
         total = load(target, at + r * pitch)
         for k in range(r + 1, width):
-            total = add_scaled(total, load(target, at + k * pitch), -dense[first + k * width + r])
-        store(target, at + r * pitch, add_scaled(zeros(), total, dense[first + r * width + r]))
+            total = add_scaled(total, load(target, at + k * pitch), -dense[first + k * stride + r])
+        store(target, at + r * pitch, add_scaled(zeros(), total, dense[first + r * stride + r]))
 
 
 @routine
@@ -356,54 +358,46 @@ def respond_dense(system, i, work, dense, inverse):
     pitch = padded(width)
     for r in range(width):
         for l in range(pitch):
-            inverse[body.inverse + r * pitch + l] = 1.0 if r == l else 0.0
+            inverse[body.dense + r * pitch + l] = 1.0 if r == l else 0.0
     for block in range(0, pitch, LANES):
-        solve_dense(system, i, dense, inverse, inverse, body.inverse + block, pitch)
+        solve_dense(system, i, dense, inverse, inverse, body.dense + block, pitch)
 
 
 @inlined
-def inverse_times(system, i, inverse, y, x):
-    """Multiply x by (M + b (K + K_g))^-1 of body i in place, in its body frame; y is scratch.
+def dense_times(system, i, matrix, y, x):
+    """Multiply x of body i by its symmetric matrix in place, in the body frame; y is scratch.
 
-    `inverse` is work.inverse, None if no body has a dense matrix.
+    `matrix` is work.mass or work.inverse, None if no body has a dense matrix.
     """
-    if inverse is None:
+    if matrix is None:
         return
-    body = system.bodies[i]
-    width, o = 3 + body.nf, body.offset
+    width, o = 3 + system.bodies[i].nf, system.bodies[i].offset
     pitch = padded(width)
-    for j in range(pitch):
-        y[j] = x[o + j] if j < width else 0.0
-    at = body.inverse
+    for block in range(0, pitch, LANES):
+        store(y, block, column_product(matrix, system.bodies[i].dense + block, pitch, width, x, o))
     for r in range(width):
-        x[o + r] = row_product(inverse, at, pitch, y)
+        x[o + r] = y[r]
+
+
+@inlined
+def column_product(matrix, at, pitch, rows, x, o):
+    """Return the sum of eight columns of a matrix with rows `pitch` apart, times x from o on."""
+    total = zeros()
+    for k in range(rows):
+        total = add_scaled(total, load(matrix, at), x[o + k])
         at += pitch
+    return total
 
 
-@routine
-def second_order_mass_times(system, i, mass, product, x):
-    """Multiply x by M of body i in place, in its body frame; `product` is scratch."""
-    body = system.bodies[i]
-    o, width = body.offset, 3 + body.nf
-    for r in range(width):
-        total = 0.0
-        for k in range(width):
-            total += mass[body.dense + r * width + k] * x[o + k]
-        product[r] = total
-    for r in range(width):
-        x[o + r] = product[r]
-
-
-@routine
-def second_order_mass_square(system, i, mass, x, x0, x1):
-    """Return x^T M x of body i, where x0 and x1 are the translational part in its frame."""
-    body = system.bodies[i]
-    o, width, at = body.offset, 3 + body.nf, body.dense
-    square = 0.0
-    for r in range(width):
-        xr = x0 if r == 0 else (x1 if r == 1 else x[o + r])
-        total = mass[at + r * width] * x0 + mass[at + r * width + 1] * x1
-        for k in range(2, width):
-            total += mass[at + r * width + k] * x[o + k]
-        square += xr * total
-    return square
+@inlined
+def dense_square(system, i, mass, y, x, x0, x1):
+    """Return x^T M x of body i, where x0 and x1 are the translational part in its frame; y is scratch."""
+    width, o = 3 + system.bodies[i].nf, system.bodies[i].offset
+    pitch, total = padded(width), zeros()
+    y[0], y[1] = x0, x1
+    for k in range(2, pitch):
+        y[k] = x[o + k] if k < width else 0.0
+    for block in range(0, pitch, LANES):
+        column = column_product(mass, system.bodies[i].dense + block, pitch, width, y, 0)
+        total = add_product(total, column, load(y, block))
+    return summed(total)

@@ -63,7 +63,7 @@ def begin_body(system, i, q, v, a, f, scratch, points):
     body_sums(system, i, q, v, a, scratch)
     clear_shares(system, i, scratch)
     if points is not None and system.bodies[i].slopes > 0:
-        second_order_equations(system, i, q, v, a, f, points)
+        second_order_equations(system, i, scratch.turn[0], scratch.turn[1], q, v, a, f, points)
     else:
         linear_terms(system, i, q, v, a, f, scratch)
     add_coupled_damping(system, i, v, f, scratch)

@@ -9,7 +9,7 @@ from math import cos, sin, sqrt
 
 from .arrays import fill
 from .axes import turn_axes
-from .bending import inverse_times
+from .bending import dense_times
 from .compiling import inlined, kernel, routine, unoptimised
 from .factor import factor_bodies, solve_rigid
 from .packed import ANGLE, AXIS, CONSTRAINT, DINV, POINT, SPRING
@@ -330,7 +330,7 @@ def solve_all(system, work, inverse, x, mu):
             for j in range(3, 3 + body.nf):
                 x[o + j] = work.flex[DINV, body.flex + j - 3] * x[o + j] + lanes_of(system, i, j, work)
         else:
-            inverse_times(system, i, inverse, work.scratch.rigid, x)
+            dense_times(system, i, inverse, work.scratch.rigid, x)
             for j in range(3 + body.nf):
                 x[o + j] += lanes_of(system, i, j, work)
         to_ground_frame(system, i, work, x)

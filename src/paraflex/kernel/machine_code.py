@@ -7,6 +7,8 @@ results would depend on the order of loading.
 Plain Numba also counts references to every array that a local name refers to (for one field of a workspace, those of
 all others too) by atomic operations, which cost more than the arithmetic. Kernels create no arrays: their caller owns
 them.
+
+Plain Numba compares every index with zero, as negative ones count from the end. Kernels use none.
 """
 
 from collections.abc import Callable
@@ -14,10 +16,11 @@ from functools import cache, cached_property
 from typing import Any
 
 from llvmlite import binding
-from numba import njit
+from numba import njit, types
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import CompilerBase
 from numba.core.compiler_machinery import PassManager
+from numba.np import arrayobj
 
 from .disk_cache import KernelCache
 from .notice import announce_compiling
@@ -25,6 +28,19 @@ from .passes import kernel_passes, remembered_signatures
 
 # Optimisation level of LLVM, 0 to 3.
 _LITTLE = 0
+# Beginning of the names that Numba gives to the code of kernels: functions of other packages keep their indices.
+_OF_KERNELS = "_ZN8paraflex6kernel"
+_numbas_index = arrayobj.fix_integer_index
+
+
+def _index(context: Any, builder: Any, kind: Any, index: Any, size: Any) -> Any:
+    """Return an index as a number of the machine; Numba adds the size to a negative one, except in kernels."""
+    if builder.function.name.startswith(_OF_KERNELS):
+        return context.cast(builder, index, kind, types.intp)
+    return _numbas_index(context, builder, kind, index, size)
+
+
+arrayobj.fix_integer_index = _index
 
 
 class _Library(JITCodeLibrary):

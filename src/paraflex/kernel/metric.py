@@ -2,7 +2,7 @@
 
 from math import sqrt
 
-from .bending import second_order_mass_square, second_order_mass_times
+from .bending import dense_square, dense_times
 from .compiling import inlined, kernel
 from .packed import MPF, S2X, S2Y
 
@@ -15,7 +15,7 @@ def mass_times(system, i, work, mass, x):
     """
     body = system.bodies[i]
     if mass is not None and body.slopes > 0:
-        second_order_mass_times(system, i, mass, work.scratch.rigid, x)
+        dense_times(system, i, mass, work.scratch.rigid, x)
         return
     o, n, k = body.offset, body.nf, body.flex
     e = o + 3
@@ -42,7 +42,7 @@ def mass_square(system, i, work, mass, x):
     c, s = work.frame[i, 0], work.frame[i, 1]
     x0, x1, x2 = c * x[o] + s * x[o + 1], c * x[o + 1] - s * x[o], x[o + 2]
     if mass is not None and body.slopes > 0:
-        return second_order_mass_square(system, i, mass, x, x0, x1)
+        return dense_square(system, i, mass, work.scratch.rigid, x, x0, x1)
     sx, sy, inertia = work.frame[i, 2], work.frame[i, 3], work.frame[i, 4]
     fx, fy, fp, ff = 0.0, 0.0, 0.0, 0.0
     for j in range(body.nf):

@@ -139,8 +139,9 @@ def rest_of_row(system, work, i, scratch):
     if inverse == 0.0:
         return follows, inverse, 1.0
     pivot = 1.0 / (inverse * inverse)
-    own, before = pivot + square, system.rows[i - 1].start - first
-    if system.rows[i].second and work.schur[before + i - 1] > 0.0:
+    own, second = pivot + square, system.rows[i].second > 0
+    before = system.rows[i - 1].start - first if second else 0
+    if second and work.schur[before + i - 1] > 0.0:
         diagonal = 1.0 / work.schur[before + i - 1]
         product, first_square = work.schur[start + i - 1] * diagonal, diagonal * diagonal
         for k in range(first, i - 1):

@@ -104,7 +104,7 @@ def descriptor_residual(system, signals, t, weights, y, dy, dropped, torques, wo
         out[n + j] = work.f[j]
     for r in range(m):
         out[2 * n + r] = lam[r] if dropped[r] else work.rows[r]
-    out[-1] = dy[-1] - input_power(system, signals, t, q, v, lam, torques, work)
+    out[out.size - 1] = dy[dy.size - 1] - input_power(system, signals, t, q, v, lam, torques, work)
 
 
 @kernel
@@ -135,7 +135,7 @@ def descriptor_jacobian(system, weights, y, dy, c, dropped, torques, work, direc
         direction.lam[r] = 0.0
         fill_column(direction, n, 2 * n, 2 * n + r, out)
     drop_rows(dropped, 2 * n, 2 * n, out)
-    out[-1, -1] = c
+    out[2 * n + m, 2 * n + m] = c
 
 
 @routine

@@ -59,8 +59,7 @@ BODY = _record(
     ("inertias", np.int64),  # first entry of its 3 x pitch matrix in `inertias`
     # 1 if its iteration matrix is dense: in second-order geometry, or if damping couples its modes.
     ("full", np.int64),
-    ("dense", np.int64),  # first entry of its (3 + nf) x (3 + nf) matrices in the workspace
-    ("inverse", np.int64),  # first entry of its inverse in the workspace, with padded rows
+    ("dense", np.int64),  # first entry of its (3 + nf) x (3 + nf) matrices in the workspace, with padded rows
     ("m", np.float64),
     ("S1x", np.float64),
     ("S1y", np.float64),
@@ -244,9 +243,9 @@ class Workspace(NamedTuple):
     redundant: Annotated[Floats, "m"]  # relative pivot up to which a row redundant at the start is dependent, else 0
     least: Annotated[Floats, 2]  # smallest relative pivot of the other rows, and index of its row
     # Matrices of bodies with a dense iteration matrix; None if `PackedSystem.bending` is None:
-    mass: Array | None  # M, (3 + nf)^2 entries per body
+    mass: Array | None  # M, rows padded, as in the next two
     dense: Array | None  # Cholesky factor of M + b (K + K_g)
-    inverse: Array | None  # inverse of M + b (K + K_g), rows padded
+    inverse: Array | None  # inverse of M + b (K + K_g)
     geometric: Array | None  # K_g, nf^2 entries per body
 
 
@@ -268,11 +267,7 @@ def make_workspace(system: PackedSystem) -> Workspace:
         "envelope": int(np.sum(1 + np.arange(rows.size) - rows["first"])),
     }
     full = width[bodies["full"] > 0]
-    dense = {
-        "mass": np.sum(full**2),
-        "dense": np.sum(full**2),
-        "inverse": sum(size * padded(int(size)) for size in full),
-    }
+    dense = dict.fromkeys(("mass", "dense", "inverse"), sum(size * padded(int(size)) for size in full))
     matrices = {
         name: None if system.bending is None else apart(int(size))
         for name, size in {**dense, "geometric": system.I2.size}.items()

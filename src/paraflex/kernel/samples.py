@@ -167,11 +167,14 @@ def solve_at(system, signals, t, weights, g, b, contraction, march, work, a, lam
         add(work.mu, lam)
         # Accelerations times the mass are the forces of the equations of motion.
         change = max(largest(work.mu), system.total_mass * mass_norm(system, work, work.x))
-        size = max(largest(lam), system.total_mass * mass_norm(system, work, a))
         if not isfinite(change):
             return False
         if previous > 0.0:
             contraction = change / previous
+        size = largest(lam)
+        # Where forces of the joints are large enough, the other norm is not needed.
+        if change * contraction > FORCES * size:
+            size = max(size, system.total_mass * mass_norm(system, work, a))
         if change <= ROUNDING * size or change * contraction <= FORCES * size:
             return True
         if contraction > WORST_CONTRACTION and previous > 0.0:
