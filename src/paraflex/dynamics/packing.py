@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from paraflex.arrays import Array, Records
+from paraflex.arrays import Array, Indices, Records
 from paraflex.kernel.packed import (
     ANGLE,
     AXIS,
@@ -30,6 +30,8 @@ from .coordinates import BodyCoordinates, Marker, PlacedBodies, transverse_piece
 from .inputs import inputs_of
 from .scale import mechanism_size
 
+# Displacements of mass points in one direction below this part of those in the other are rounding.
+_ROUNDING = 1e-12
 # Fields of a line that a spring between points defines.
 _OF_SPRINGS = ("stiffness", "length", "damping")
 
@@ -77,7 +79,9 @@ def pack_system(placed: PlacedBodies, constraints: list[Constraint]) -> tuple[Pa
         # position along the beam, mass and moment of inertia (3, pitch).
         places=_flat([np.hstack([_padded(rows.T) for rows in (p.N[:, 0], p.N[:, 1], p.slope)]) for p in points]),
         spans=_flat([_padded(p.weights.T) for p in points]),
+        weights=_flat([_padded(p.weights, p.mass.size) for p in points]),
         inertias=_flat([_padded(np.stack([p.x, p.mass, p.inertia])) for p in points]),
+        kinds=np.concatenate([rows for body in bodies for rows in _kinds(body)]),
         total_mass=np.sum([body.integrals.m for body in bodies]).item(),
         size=packer.size,
         gravity=np.array(mechanism.gravity) * 1.0,
@@ -216,12 +220,20 @@ def _flat(matrices: list[Array]) -> Array:
     return np.concatenate([np.zeros(0), *(matrix.ravel() for matrix in matrices)])
 
 
-def _padded(matrix: Array) -> Array:
-    """Return the matrix padded with columns of zeros to whole vectors."""
+def _padded(matrix: Array, width: int = 0) -> Array:
+    """Return the matrix padded with columns of zeros to whole vectors, of a width at least."""
     rows, columns = matrix.shape
-    out = np.zeros((rows, padded(columns)), dtype=matrix.dtype)
+    out = np.zeros((rows, padded(max(columns, width))), dtype=matrix.dtype)
     out[:, :columns] = matrix
     return out
+
+
+def _kinds(body: BodyCoordinates) -> tuple[Indices, Indices]:
+    """Return the flexible coordinates that move mass points of a beam along it, and those that move them across it."""
+    if body.points is None:
+        return np.zeros(0, dtype=int), np.zeros(0, dtype=int)
+    x, y = np.max(np.abs(body.points.N), axis=0)
+    return np.flatnonzero(x > _ROUNDING * y), np.flatnonzero(y > _ROUNDING * x)
 
 
 def _columns(bodies: tuple[BodyCoordinates, ...], markers: list[Marker]) -> list[Array]:
@@ -261,12 +273,15 @@ def _body_records(bodies, ports, motor_sides, columns) -> Records:
             "jac": size * lanes,
             "places": 3 * nf * pitch,
             "spans": slopes * pitch,
+            "weights": points * pitch,
             "inertias": 3 * pitch,
             "dense": size * padded(size) if full else 0,
             "port": len(body_ports),
             "motor": len(body_motors),
             "columns": matrix.size,
         }
+        along, across = _kinds(body)
+        own["along"] = along.size + across.size
         starts = {name: start[name] for name in own}
         start.update(own)
         numbers = {
@@ -280,6 +295,8 @@ def _body_records(bodies, ports, motor_sides, columns) -> Records:
             "points": points,
             "slopes": slopes,
             "pitch": pitch,
+            "across": starts["along"] + along.size,
+            "across_end": start["along"],
             "full": int(full),
             "port_end": start["port"],
             "motor_end": start["motor"],

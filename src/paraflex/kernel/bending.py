@@ -9,15 +9,48 @@ from math import cos, sin, sqrt
 
 from .compiling import inlined, kernel, routine
 from .packed import ANGLE, AXIS, DAMPING, MPF, OMEGA2, S2X, S2Y
-from .sums import column_sums, row_product
+from .sums import part_product
 from .vectors import LANES, add_product, add_scaled, load, padded, store, summed, zeros
 
 
 @inlined
 def place_sums(system, i, q, v, a, points):
-    """Compute Nx u, Ny u and the slopes of all mass points of body i, and the same for u' and u''."""
+    """Compute Nx u, Ny u and the slopes of all mass points of body i, and the same for u' and u''.
+
+    Into points.bent go the terms of the shortening at Gauss points, and of its derivatives.
+    """
     body = system.bodies[i]
-    column_sums(system.places, body.places, 3 * body.pitch, body.nf, body.offset + 3, q, v, a, points)
+    pitch = body.pitch
+    kind_sums(system, body, 0, pitch, body.along, body.across, q, v, a, points)
+    kind_sums(system, body, pitch, 3 * pitch, body.across, body.across_end, q, v, a, points)
+    for block in range(0, pitch, LANES):
+        slope = 2 * pitch + block
+        s0, s1 = load(points.q, slope), load(points.v, slope)
+        minus = add_scaled(zeros(), s0, -1.0)
+        store(points.bent, block, add_product(zeros(), add_scaled(zeros(), minus, 0.5), s0))
+        store(points.bent, pitch + block, add_product(zeros(), minus, s1))
+        squares = add_product(zeros(), add_scaled(zeros(), s1, -1.0), s1)
+        store(points.bent, slope, add_product(squares, minus, load(points.a, slope)))
+
+
+@inlined
+def kind_sums(system, body, start, end, first, last, q, v, a, points):
+    """Compute the sums from start to end of `place_sums`, to which only coordinates of one kind contribute.
+
+    Their numbers are system.kinds from first to last.
+    """
+    e, stride = body.offset + 3, 3 * body.pitch
+    for block in range(start, end, LANES):
+        of_q, of_v, of_a, at = zeros(), zeros(), zeros(), body.places + block
+        for k in range(first, last):
+            j = system.kinds[k]
+            column = load(system.places, at + j * stride)
+            of_q = add_scaled(of_q, column, q[e + j])
+            of_v = add_scaled(of_v, column, v[e + j])
+            of_a = add_scaled(of_a, column, a[e + j])
+        store(points.q, block, of_q)
+        store(points.v, block, of_v)
+        store(points.a, block, of_a)
 
 
 @inlined
@@ -49,12 +82,20 @@ def second_order_equations(system, i, c, s, q, v, a, f, points):
         store(points.shares, slope, turn)
         fx, fy, turning = add_scaled(fx, mx, 1.0), add_scaled(fy, my, 1.0), add_scaled(turning, turn, 1.0)
         lever_x, lever_y = add_product(lever_x, sx, my), add_product(lever_y, sy, mx)
-    for j in range(body.slopes):
-        points.axial[j] = row_product(system.spans, body.spans + j * pitch, pitch, points.shares)
-        points.shares[2 * pitch + j] -= points.q[2 * pitch + j] * points.axial[j]
+    for block in range(0, pitch, LANES):
+        axial, at, slope = zeros(), body.weights + block, 2 * pitch + block
+        for k in range(body.points):
+            axial = add_scaled(axial, load(system.weights, at), points.shares[k])
+            at += pitch
+        store(points.axial, block, axial)
+        minus = add_scaled(zeros(), axial, -1.0)
+        store(points.shares, slope, add_product(load(points.shares, slope), minus, load(points.q, slope)))
     for j in range(n):
         f[e + j] = system.modal[OMEGA2, body.flex + j] * q[e + j] + system.modal[DAMPING, body.flex + j] * v[e + j]
-        f[e + j] += row_product(system.places, body.places + 3 * pitch * j, 3 * pitch, points.shares)
+    for k in range(body.along, body.across_end):
+        j = system.kinds[k]
+        start, end = (0, pitch) if k < body.across else (pitch, 3 * pitch)
+        f[e + j] += part_product(system.places, body.places + 3 * pitch * j, start, end, points.shares)
     f[o] = c * summed(fx) - s * summed(fy)
     f[o + 1] = s * summed(fx) + c * summed(fy)
     f[o + 2] = summed(lever_x) - summed(lever_y) + summed(turning)
@@ -74,12 +115,11 @@ def shortened(system, i, block, points):
     pitch = body.pitch
     sx = add_scaled(load(system.inertias, body.inertias + block), load(points.q, block), 1.0)
     vx, bx, at = load(points.v, block), load(points.a, block), body.spans + block
-    for j in range(2 * pitch, 2 * pitch + body.slopes):
-        s0, s1 = points.q[j], points.v[j]
+    for j in range(body.slopes):
         weight = load(system.spans, at)
-        sx = add_scaled(sx, weight, -0.5 * s0 * s0)
-        vx = add_scaled(vx, weight, -s0 * s1)
-        bx = add_scaled(bx, weight, -s1 * s1 - s0 * points.a[j])
+        sx = add_scaled(sx, weight, points.bent[j])
+        vx = add_scaled(vx, weight, points.bent[pitch + j])
+        bx = add_scaled(bx, weight, points.bent[2 * pitch + j])
         at += pitch
     return sx, vx, bx
 
@@ -211,8 +251,6 @@ def note_axial_forces(system, i, q, v, a, lam, work, points, geometric):
     c, s = cos(q[body.offset + 2]), sin(q[body.offset + 2])
     # Only the axial forces at the Gauss points are used.
     second_order_equations(system, i, c, s, q, v, a, work.f, points)
-    for j in range(body.slopes, pitch):
-        points.axial[j] = 0.0
     for l in range(n):
         slopes = body.places + 3 * pitch * l + 2 * pitch
         for d in range(n):

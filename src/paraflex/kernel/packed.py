@@ -56,6 +56,11 @@ BODY = _record(
     ("pitch", np.int64),  # number of its mass points, padded
     ("places", np.int64),  # first entry of its nf x 3 pitch matrix in `places`
     ("spans", np.int64),  # first entry of its slopes x pitch matrix in `spans`
+    ("weights", np.int64),  # first entry of its points x pitch matrix in `weights`
+    # First entries of its coordinates in `kinds`: of those that move mass points along it, and across it.
+    ("along", np.int64),
+    ("across", np.int64),
+    ("across_end", np.int64),
     ("inertias", np.int64),  # first entry of its 3 x pitch matrix in `inertias`
     # 1 if its iteration matrix is dense: in second-order geometry, or if damping couples its modes.
     ("full", np.int64),
@@ -169,10 +174,13 @@ class PackedSystem(NamedTuple):
     # kernels are then compiled without the code for these.
     bending: Array | None  # nf x stride matrix of every marker that bending displaces: f = u . bending u
     # Data of every body's mass points: Nx, Ny and N2' of all points by coordinate; weights of all points by Gauss
-    # point; x, mass and moment of inertia.
+    # point, and of all Gauss points by point; x, mass and moment of inertia; numbers of the coordinates with Nx, and of
+    # those with Ny and N2'.
     places: Array
     spans: Array
+    weights: Array
     inertias: Array
+    kinds: Indices
     total_mass: float
     size: float  # size of the mechanism [m], a power of two, see `dynamics.scale`
     gravity: Array  # (2,) gravity in the ground frame [m/s^2]
@@ -196,6 +204,7 @@ class PointScratch(NamedTuple):
     a: Annotated[Floats, "sums"]
     shares: Annotated[Floats, "sums"]  # force on each
     axial: Annotated[Floats, "pitch"]  # axial forces at the Gauss points
+    bent: Annotated[Floats, "sums"]  # -w^2/2 for the slopes w at the Gauss points, and its two derivatives
     rows: Annotated[Floats, "tangents"]  # ds/du: x and y of all points by coordinate
     B_q: Annotated[Floats, "stride"]  # a marker's bending matrix times u
     B_v: Annotated[Floats, "stride"]

@@ -38,8 +38,14 @@ def column_sums(matrix, first, width, n, e, q, v, a, out):
 @inlined
 def row_product(matrix, at, width, vector):
     """Return the product of a matrix row, `width` entries from `at` on, and a vector."""
+    return part_product(matrix, at, 0, width, vector)
+
+
+@inlined
+def part_product(matrix, at, start, end, vector):
+    """Return the product of the entries from start to end of a matrix row, which begins at `at`, and of a vector."""
     total = zeros()
-    for block in range(0, width, LANES):
+    for block in range(start, end, LANES):
         total = add_product(total, load(matrix, at + block), load(vector, block))
     return summed(total)
 
