@@ -5,6 +5,7 @@ frequencies) then grows with the number of entries, not with the square of the n
 """
 
 from collections.abc import Iterable, Sequence
+from typing import NamedTuple
 
 import numpy as np
 import scipy
@@ -83,33 +84,65 @@ def sparse_joint_rows(system: System, joints: Iterable[str], q: Array) -> scipy.
     return scipy.sparse.csr_matrix(scipy.sparse.vstack([scipy.sparse.csr_matrix((0, system.n)), *rows]))
 
 
-def sparse_jacobian(system: System, q: Array) -> scipy.sparse.csr_matrix:
-    """Return Phi_q (m, n) at q; zero in the rows of springs and dampers.
+class JacobianEntries(NamedTuple):
+    """Entries of Phi_q that may be nonzero, in groups of coordinates of which no two have entries in one row.
 
-    A column is Phi' with unit velocity of one coordinate. Bodies that share no row are moved at once, so that the
-    number of evaluations does not grow with the number of bodies. This holds for all kinds of joints.
+    Attributes
+    ----------
+    rows, columns : (entries,) arrays of int
+        Row and column of each entry, one group after the other.
+    groups : tuple of pairs of arrays
+        Coordinates of each group, and the rows of its entries.
     """
+
+    rows: Indices
+    columns: Indices
+    groups: tuple[tuple[Indices, Indices], ...]
+
+
+def jacobian_entries(system: System) -> JacobianEntries:
+    """Return the entries of Phi_q that may be nonzero at some pose."""
+    return system.once("jacobian entries", lambda: _entries(system))
+
+
+def _entries(system: System) -> JacobianEntries:
     row, owner = tied_bodies(system)
     offset = np.array([body.offset for body in system.bodies])
     size = np.array([3 + body.nf for body in system.bodies])
     colour = greedy_colours(neighbours(system))
-    still, scratch = no_signals(system.packed), make_scratch(system.packed)
-    phi, rate = np.zeros((2, system.m))
-    rows, columns, values = [], [], []
+    rows, columns, groups = [row[:0]], [row[:0]], []
     for group in range(int(colour.max(initial=-1)) + 1):
         of_group = colour == group
         for local in range(int(size[of_group].max(initial=0))):
-            v = np.zeros(system.n)
-            v[offset[of_group & (size > local)] + local] = 1.0
-            constraint_values(system.packed, still, 0.0, q, v, scratch, phi, rate)
             here = of_group[owner] & (size[owner] > local)
             rows.append(row[here])
             columns.append(offset[owner[here]] + local)
-            values.append(rate[row[here]])
-    if not rows:
-        return scipy.sparse.csr_matrix((system.m, system.n))
-    entries = (np.concatenate(values), (np.concatenate(rows), np.concatenate(columns)))
-    jacobian = scipy.sparse.csr_matrix(entries, shape=(system.m, system.n))
+            groups.append((offset[of_group & (size > local)] + local, row[here]))
+    return JacobianEntries(np.concatenate(rows), np.concatenate(columns), tuple(groups))
+
+
+def jacobian_values(system: System, q: Array) -> Array:
+    """Return the values of `jacobian_entries` at q.
+
+    A column is Phi' with unit velocity of one coordinate. Bodies that share no row are moved at once, so that the
+    number of evaluations does not grow with the number of bodies. This holds for all kinds of joints.
+    """
+    still, scratch = no_signals(system.packed), make_scratch(system.packed)
+    phi, rate = np.zeros((2, system.m))
+    values = [rate[:0]]
+    for moved, rows in jacobian_entries(system).groups:
+        v = np.zeros(system.n)
+        v[moved] = 1.0
+        constraint_values(system.packed, still, 0.0, q, v, scratch, phi, rate)
+        values.append(rate[rows])
+    return np.concatenate(values)
+
+
+def sparse_jacobian(system: System, q: Array) -> scipy.sparse.csr_matrix:
+    """Return Phi_q (m, n) at q; zero in the rows of springs and dampers."""
+    entries = jacobian_entries(system)
+    places = (entries.rows, entries.columns)
+    jacobian = scipy.sparse.csr_matrix((jacobian_values(system, q), places), shape=(system.m, system.n))
     jacobian.eliminate_zeros()
     return jacobian
 
