@@ -15,7 +15,7 @@ from paraflex.kernel.bodies import motion_forces
 from paraflex.kernel.constraints import constraint_values
 from paraflex.kernel.packed import OMEGA2, PackedSystem, make_scratch
 from paraflex.mechanism import is_hinge
-from .joint_coordinates import joint_coordinate
+from .joint_coordinates import own_coordinate
 from .signals import no_signals
 from .system import System
 
@@ -80,8 +80,13 @@ def elastic_stiffness(system: System, q: Array, *, every_spring: bool = False) -
 
 def sparse_joint_rows(system: System, joints: Iterable[str], q: Array) -> scipy.sparse.csr_matrix:
     """Return the derivatives (joints, n) of the coordinates of joints."""
-    rows = [scipy.sparse.csr_matrix(joint_coordinate(system, joint, q[None]).rows) for joint in joints]
-    return scipy.sparse.csr_matrix(scipy.sparse.vstack([scipy.sparse.csr_matrix((0, system.n)), *rows]))
+    parts = [own_coordinate(system, joint, q[None]) for joint in joints]
+    rows = np.repeat(np.arange(len(parts)), [columns.size for _, columns in parts])
+    columns = np.concatenate([np.zeros(0, dtype=int), *(columns for _, columns in parts)])
+    values = np.concatenate([np.zeros(0), *(found.rows[0] for found, _ in parts)])
+    matrix = scipy.sparse.csr_matrix((values, (rows, columns)), shape=(len(parts), system.n))
+    matrix.eliminate_zeros()
+    return matrix
 
 
 class JacobianEntries(NamedTuple):
