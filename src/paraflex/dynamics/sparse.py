@@ -5,7 +5,6 @@ frequencies) then grows with the number of entries, not with the square of the n
 """
 
 from collections.abc import Iterable, Sequence
-from typing import NamedTuple
 
 import numpy as np
 import scipy
@@ -89,28 +88,15 @@ def sparse_joint_rows(system: System, joints: Iterable[str], q: Array) -> scipy.
     return matrix
 
 
-class JacobianEntries(NamedTuple):
-    """Entries of Phi_q that may be nonzero, in groups of coordinates of which no two have entries in one row.
+def jacobian_entries(system: System) -> tuple[Indices, Indices, list[tuple[Indices, Indices]]]:
+    """Return rows and columns of the entries of Phi_q that may be nonzero, and groups of coordinates that share no row.
 
-    Attributes
-    ----------
-    rows, columns : (entries,) arrays of int
-        Row and column of each entry, one group after the other.
-    groups : tuple of pairs of arrays
-        Coordinates of each group, and the rows of its entries.
+    A group is given by its coordinates and the rows of its entries; entries are in the order of the groups.
     """
-
-    rows: Indices
-    columns: Indices
-    groups: tuple[tuple[Indices, Indices], ...]
-
-
-def jacobian_entries(system: System) -> JacobianEntries:
-    """Return the entries of Phi_q that may be nonzero at some pose."""
     return system.once("jacobian entries", lambda: _entries(system))
 
 
-def _entries(system: System) -> JacobianEntries:
+def _entries(system: System) -> tuple[Indices, Indices, list[tuple[Indices, Indices]]]:
     row, owner = tied_bodies(system)
     offset = np.array([body.offset for body in system.bodies])
     size = np.array([3 + body.nf for body in system.bodies])
@@ -123,7 +109,7 @@ def _entries(system: System) -> JacobianEntries:
             rows.append(row[here])
             columns.append(offset[owner[here]] + local)
             groups.append((offset[of_group & (size > local)] + local, row[here]))
-    return JacobianEntries(np.concatenate(rows), np.concatenate(columns), tuple(groups))
+    return np.concatenate(rows), np.concatenate(columns), groups
 
 
 def jacobian_values(system: System, q: Array) -> Array:
@@ -135,7 +121,7 @@ def jacobian_values(system: System, q: Array) -> Array:
     still, scratch = no_signals(system.packed), make_scratch(system.packed)
     phi, rate = np.zeros((2, system.m))
     values = [rate[:0]]
-    for moved, rows in jacobian_entries(system).groups:
+    for moved, rows in jacobian_entries(system)[2]:
         v = np.zeros(system.n)
         v[moved] = 1.0
         constraint_values(system.packed, still, 0.0, q, v, scratch, phi, rate)
@@ -145,9 +131,8 @@ def jacobian_values(system: System, q: Array) -> Array:
 
 def sparse_jacobian(system: System, q: Array) -> scipy.sparse.csr_matrix:
     """Return Phi_q (m, n) at q; zero in the rows of springs and dampers."""
-    entries = jacobian_entries(system)
-    places = (entries.rows, entries.columns)
-    jacobian = scipy.sparse.csr_matrix((jacobian_values(system, q), places), shape=(system.m, system.n))
+    entries = jacobian_values(system, q), jacobian_entries(system)[:2]
+    jacobian = scipy.sparse.csr_matrix(entries, shape=(system.m, system.n))
     jacobian.eliminate_zeros()
     return jacobian
 

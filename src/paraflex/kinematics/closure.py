@@ -430,7 +430,7 @@ class PathClosure:
 
     @cached_property
     def _sparse(self) -> SparseClosure:
-        return SparseClosure(self.system, self.packed, self.marker, self.coordinates, self.signals)
+        return SparseClosure(self)
 
     @cached_property
     def _other_poses(self) -> list[Array]:

@@ -105,8 +105,8 @@ class Shortfall:
         return Shortfall(*(np.concatenate([getattr(self, name), getattr(more, name)])[order] for name in names))
 
 
-def _unit_matrix(n: int) -> scipy.sparse.csr_matrix:
-    return scipy.sparse.csr_matrix(scipy.sparse.identity(n))
+def _nearest(rows: scipy.sparse.csr_matrix) -> Saddle:
+    return Saddle(scipy.sparse.csr_matrix(scipy.sparse.identity(rows.shape[1])), rows)
 
 
 @dataclass(frozen=True)
@@ -225,19 +225,16 @@ class PoseSearch:
         """Return the dimensionless least change; dense for few rows, as a search closes thousands of poses."""
         jacobian, units, row_units = self._jacobian(q), self.system.units, self.system.row_units
         if not isinstance(jacobian, np.ndarray):
-            change = Saddle(_unit_matrix(self.system.n), jacobian)
-            return lambda phi: units * change.solve(r=phi / row_units)[0]
+            nearest = _nearest(jacobian)
+            return lambda phi: units * nearest.solve(r=phi / row_units)[0]
         return lambda phi: units * np.linalg.lstsq(jacobian, phi / row_units, rcond=_DEPENDENT)[0]
 
     def _jacobian(self, q: Array) -> Any:
         """Return the dimensionless Phi_q, a dense array or, for many rows, a sparse matrix."""
         if self.system.m <= DENSE_ROWS:
             return self.system.dimensionless_jacobian(q)
-        return scipy.sparse.csr_matrix(
-            scipy.sparse.diags(1.0 / self.system.row_units)
-            @ sparse_jacobian(self.system, q)
-            @ scipy.sparse.diags(self.system.units)
-        )
+        rows, columns = scipy.sparse.diags(1.0 / self.system.row_units), scipy.sparse.diags(self.system.units)
+        return scipy.sparse.csr_matrix(rows @ sparse_jacobian(self.system, q) @ columns)
 
     def _slope(self, q: Array, goal: Array, multipliers: Array | None = None) -> tuple[Array, Any]:
         """Return the gradient of half the squared distance, or of the Lagrangian with multipliers; and Phi_q."""
@@ -248,12 +245,10 @@ class PoseSearch:
     def _admissible(self, jacobian: Any, slope: Array) -> tuple[Array, Array]:
         """Return a basis (n, f) of the null space of Phi_q, and the multipliers (m,) that balance a slope best."""
         if not isinstance(jacobian, np.ndarray):
-            n, freedoms = self.system.n, self.system.n - self.system.n_constraints
-            nearest = Saddle(_unit_matrix(n), jacobian)
-            wishes = np.random.default_rng(0).standard_normal((n, freedoms))
-            return np.linalg.qr(nearest.solve(wishes, np.zeros((self.system.m, freedoms)))[0])[0], nearest.solve(
-                -slope
-            )[1]
+            nearest, freedoms = _nearest(jacobian), self.system.n - self.system.n_constraints
+            wishes = np.random.default_rng(0).standard_normal((self.system.n, freedoms))
+            found = nearest.solve(wishes, np.zeros((self.system.m, freedoms)))[0]
+            return np.linalg.qr(found)[0], nearest.solve(-slope)[1]
         left, sizes, right = np.linalg.svd(jacobian)
         rank = int(np.sum(sizes > _DEPENDENT * np.max(sizes, initial=0.0)))
         return right[rank:].T, -left[:, :rank] @ ((right[:rank] @ slope) / sizes[:rank])

@@ -24,7 +24,8 @@ def with_phases(mechanism: Members) -> dict[str, tuple[Any, ...]]:
     InputError
         A length or phase is not given, and no assembly determines it.
     """
-    poses = cache(lambda: _first_poses(mechanism))
+    first = mechanism.assemblies[:1]
+    poses = cache(lambda: approximate_poses(mechanism, *first) | placed_poses(mechanism, *first))
     found: dict[str, tuple[Any, ...]] = {
         "joints": tuple(_with_length(mechanism, poses, one) if one.length is None else one for one in mechanism.joints)
     }
@@ -35,12 +36,6 @@ def with_phases(mechanism: Members) -> dict[str, tuple[Any, ...]]:
                 _with_phase(mechanism, poses, group, one) if one.phase is None else one for one in members
             )
     return found
-
-
-def _first_poses(mechanism: Members) -> dict[str, Pose]:
-    """Return the poses of bodies in the first assembly, with positions where these are determined."""
-    assembly = mechanism.assemblies[0]
-    return approximate_poses(mechanism, assembly) | placed_poses(mechanism, assembly)
 
 
 def _with_length(mechanism: Members, poses: Poses, joint: Any) -> Joint:
