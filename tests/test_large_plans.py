@@ -28,6 +28,7 @@ from paraflex.mechanism import (
     four_bars_in_a_row,
 )
 from paraflex.tracking import plan_tracking
+from paraflex.validity.numbers import mechanism_size
 
 DENSE = "paraflex.kinematics.closure.DENSE_ROWS", "paraflex.kinematics.reach.DENSE_ROWS"
 # Dense and sparse results differ by rounding errors, which long rows of loops multiply by up to a thousand.
@@ -182,3 +183,19 @@ def test_independent_rows_among_others_need_no_dense_matrix():
     found = dependence(system, q, acting=np.arange(450))
     assert found.dropped.size == 0
     np.testing.assert_array_equal(found.kept, np.arange(450))
+
+
+@pytest.mark.parametrize("shape", ["line", "circle", "cloud"])
+def test_the_largest_distance_of_many_points(shape):
+    random = np.random.default_rng(4)
+    turns = random.uniform(0.0, 2.0 * np.pi, 90)
+    points = {
+        "line": np.column_stack([np.arange(90.0), np.zeros(90)]),
+        "circle": np.column_stack([np.cos(turns), np.sin(turns)]),
+        "cloud": random.standard_normal((90, 2)),
+    }[shape]
+    known = np.max(np.linalg.norm(points[:, None] - points, axis=2))
+    ground = {f"P{i}": (float(x), float(y)) for i, (x, y) in enumerate(points)}
+    assert mechanism_size(replace(chain_of_segments(2), ground=ground | {"O": (0.0, 0.0)})) == pytest.approx(
+        max(known, np.max(np.linalg.norm(points, axis=1))), rel=1e-14
+    )
