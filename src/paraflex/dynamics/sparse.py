@@ -93,7 +93,7 @@ def jacobian_entries(system: System) -> tuple[Indices, Indices, list[tuple[Indic
 
     A group is given by its coordinates and the rows of its entries; entries are in the order of the groups.
     """
-    return system.once("jacobian entries", lambda: _entries(system))
+    return system.once("entries of the Jacobian", lambda: _entries(system))
 
 
 def _entries(system: System) -> tuple[Indices, Indices, list[tuple[Indices, Indices]]]:
