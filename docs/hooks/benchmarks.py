@@ -293,6 +293,22 @@ def scaling(data: dict[str, Any]) -> str:
     )
 
 
+def plans(data: dict[str, Any]) -> str:
+    """Plans of rows and chains: times over n."""
+    headings = ("n", "Plan of a row [s]", "An instant [ms]", "Memory [MB]")
+    return _table(
+        (*headings, "Plan of a chain [s]", "An instant [ms]", "Memory [MB]"),
+        [
+            (str(row["n"]), *_plan(row), *_plan(chain))
+            for row, chain in zip(data["four_bars"], data["chains"], strict=True)
+        ],
+    )
+
+
+def _plan(row: dict[str, Any]) -> tuple[str, str, str]:
+    return _seconds(row["plan"]), f"{1e3 * row['instant']:.2g}", f"{row['megabytes']:.0f}"
+
+
 def _step(row: dict[str, Any]) -> tuple[str, str]:
     return f"{1e3 * row['step']:.2g}", "" if row["ratio"] is None else f"{row['ratio']:.1f} x"
 
@@ -330,7 +346,7 @@ def _table(headings: tuple[str, ...], rows: list[tuple[str, ...]]) -> str:
 
 
 # Files of times; the others hold lengths, which do not depend on the machine.
-TIMED = ("peers", "batch", "startup", "history", "method_times", "default_method", "real_time", "scaling")
+TIMED = ("peers", "batch", "startup", "history", "method_times", "default_method", "real_time", "scaling", "plans")
 # Files with runs by other engines.
 ENGINES = ("peers", "batch", "paths_and_modes", "model_agreement", "library_agreement")
 # What a page may ask for: the file of the measurements, and what makes the table of it.
@@ -351,5 +367,6 @@ TABLES: dict[str, tuple[str, Callable[[dict[str, Any]], str]]] = {
     "convergence": ("convergence", convergence),
     "real_time": ("real_time", real_time),
     "scaling": ("scaling", scaling),
+    "plans": ("plans", plans),
     "singular_passages": ("singular_passages", singular_passages),
 }

@@ -11,6 +11,7 @@ import numpy as np
 
 from paraflex.arrays import Array, Mask
 from paraflex.dynamics import acting_loads, joint_coordinate
+from paraflex.dynamics.joint_coordinates import own_coordinate
 from paraflex.errors import ActuationError, Moment, SingularActuationError
 from paraflex.kernel.arrays import apart
 from paraflex.kernel.bodies import motion_forces
@@ -72,14 +73,14 @@ def motor_rows(motion: RigidMotion) -> Array:
 def add_springs_and_dampers(motion: RigidMotion, forces: Array) -> None:
     """Add to forces (k, n) those needed against springs, dampers, back-EMF and friction at joints."""
     for spring in motion.mechanism.springs:
-        value, _, rows = joint_coordinate(motion.system, spring.joint, motion.q)
-        forces += (spring.stiffness * (value - spring.rest))[:, None] * rows
+        (value, _, rows), own = own_coordinate(motion.system, spring.joint, motion.q)
+        forces[:, own] += (spring.stiffness * (value - spring.rest))[:, None] * rows
     for damper in with_actuators(motion.mechanism).dampers:
-        _, rate, rows = joint_coordinate(motion.system, damper.joint, motion.q, motion.v)
-        forces += (damper.coefficient * rate)[:, None] * rows
+        (_, rate, rows), own = own_coordinate(motion.system, damper.joint, motion.q, motion.v)
+        forces[:, own] += (damper.coefficient * rate)[:, None] * rows
     for friction in motion.mechanism.frictions:
-        _, rate, rows = joint_coordinate(motion.system, friction.joint, motion.q, motion.v)
-        forces += (friction.limit * np.tanh(rate / friction.speed))[:, None] * rows
+        (_, rate, rows), own = own_coordinate(motion.system, friction.joint, motion.q, motion.v)
+        forces[:, own] += (friction.limit * np.tanh(rate / friction.speed))[:, None] * rows
 
 
 def actuation_condition(effort: Effort, mode: ActuationMode) -> Array:

@@ -1,15 +1,16 @@
 """Coordinate on which a joint's motor acts: the angle of a revolute joint, the travel of a sliding joint."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 
-from paraflex.arrays import Array
+from paraflex.arrays import Array, Indices
 from paraflex.mechanism import Joint, PointRef
 from .coordinates import GROUND_INDEX, Marker
 from .points import cross, marker_place, marker_position
-from .system import System
+from .system import DENSE_ROWS, System
 
 
 class JointCoordinate(NamedTuple):
@@ -40,6 +41,22 @@ def joint_coordinate(system: System, name: str, q: Array, v: Array | None = None
     d = pb - pa
     rows = np.einsum("ki,kij->kj", e, rows_b - rows_a) + cross(e, d)[:, None] * turn
     return JointCoordinate(np.sum(e * d, axis=1), np.sum(rows * v, axis=1), rows)
+
+
+def own_coordinate(system: System, name: str, q: Array, v: Array | None = None) -> tuple[JointCoordinate, Indices]:
+    """Return `joint_coordinate` with derivatives (k, c) by the coordinates of the joint's bodies only, and these (c,).
+
+    For many bodies time and memory do not depend on their number.
+    """
+    if system.m <= DENSE_ROWS:
+        return joint_coordinate(system, name, q, v), np.arange(system.n)
+    joint, bodies, columns = system.mechanism.joint(name), [], []
+    for i in dict.fromkeys(system.marker(ref).body for ref in (joint.a, joint.b) if not ref.on_ground):
+        body = system.bodies[i]
+        bodies.append(replace(body, offset=len(columns)))
+        columns += range(body.all.start, body.all.stop)
+    part, own = replace(system, bodies=tuple(bodies)), np.array(columns)
+    return joint_coordinate(part, name, q[:, own], None if v is None else v[:, own]), own
 
 
 def joint_value(system: System, name: str, q: Array) -> float:

@@ -8,14 +8,12 @@ import scipy
 from paraflex.arrays import Array, Indices
 from paraflex.kernel.linear import factor_system
 from .sparse import body_masses, sparse_jacobian
-from .system import System
+from .system import DENSE_ROWS as DENSE_ROWS, System
 
 # A constraint row with an independent part smaller than this fraction of the largest is redundant.
 DEPENDENT = 1e-9
 # The same for rows compared by the squares of their sizes, which hold half of the digits.
 _DEPENDENT_SQUARED = 1e-12
-# Up to this number of rows a dense factorisation with pivoting is as fast as a sparse one, and more accurate.
-DENSE_ROWS = 400
 # Rows with a smaller share of a dependence than this take no part in it.
 NO_PART = 1e-6
 
@@ -92,9 +90,15 @@ def dependence(
     rigid = np.nonzero(system.constrained)[0] if acting is None else acting
     if rigid.size == 0:
         return Dependence(rigid, rigid, np.zeros((0, 0)))
-    if rigid.size <= DENSE_ROWS or acting is not None:
-        return _dense(system, q, rigid, threshold, count)
-    return _sparse(system, q, rigid, threshold, count)
+    if rigid.size > DENSE_ROWS:
+        every = np.nonzero(system.constrained)[0]
+        found = _sparse(system, q, every, threshold, count)
+        if rigid.size == every.size:
+            return found
+        # Rows that are independent together with others are independent.
+        if count is None and not found.dropped.size:
+            return Dependence(rigid, found.dropped, np.zeros((rigid.size, 0)))
+    return _dense(system, q, rigid, threshold, count)
 
 
 def _dense(system: System, q: Array, rigid: Indices, threshold: float, count: int | None) -> Dependence:

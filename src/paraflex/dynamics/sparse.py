@@ -14,7 +14,7 @@ from paraflex.kernel.bodies import motion_forces
 from paraflex.kernel.constraints import constraint_values
 from paraflex.kernel.packed import OMEGA2, PackedSystem, make_scratch
 from paraflex.mechanism import is_hinge
-from .joint_coordinates import joint_coordinate
+from .joint_coordinates import own_coordinate
 from .signals import no_signals
 from .system import System
 
@@ -79,36 +79,59 @@ def elastic_stiffness(system: System, q: Array, *, every_spring: bool = False) -
 
 def sparse_joint_rows(system: System, joints: Iterable[str], q: Array) -> scipy.sparse.csr_matrix:
     """Return the derivatives (joints, n) of the coordinates of joints."""
-    rows = [scipy.sparse.csr_matrix(joint_coordinate(system, joint, q[None]).rows) for joint in joints]
-    return scipy.sparse.csr_matrix(scipy.sparse.vstack([scipy.sparse.csr_matrix((0, system.n)), *rows]))
+    parts = [own_coordinate(system, joint, q[None]) for joint in joints]
+    rows = np.repeat(np.arange(len(parts)), [columns.size for _, columns in parts])
+    columns = np.concatenate([np.zeros(0, dtype=int), *(columns for _, columns in parts)])
+    values = np.concatenate([np.zeros(0), *(found.rows[0] for found, _ in parts)])
+    matrix = scipy.sparse.csr_matrix((values, (rows, columns)), shape=(len(parts), system.n))
+    matrix.eliminate_zeros()
+    return matrix
 
 
-def sparse_jacobian(system: System, q: Array) -> scipy.sparse.csr_matrix:
-    """Return Phi_q (m, n) at q; zero in the rows of springs and dampers.
+def jacobian_entries(system: System) -> tuple[Indices, Indices, list[tuple[Indices, Indices]]]:
+    """Return rows and columns of the entries of Phi_q that may be nonzero, and groups of coordinates that share no row.
 
-    A column is Phi' with unit velocity of one coordinate. Bodies that share no row are moved at once, so that the
-    number of evaluations does not grow with the number of bodies. This holds for all kinds of joints.
+    A group is given by its coordinates and the rows of its entries; entries are in the order of the groups.
     """
+    return system.once("entries of the Jacobian", lambda: _entries(system))
+
+
+def _entries(system: System) -> tuple[Indices, Indices, list[tuple[Indices, Indices]]]:
     row, owner = tied_bodies(system)
     offset = np.array([body.offset for body in system.bodies])
     size = np.array([3 + body.nf for body in system.bodies])
     colour = greedy_colours(neighbours(system))
-    still, scratch = no_signals(system.packed), make_scratch(system.packed)
-    phi, rate = np.zeros((2, system.m))
-    rows, columns, values = [], [], []
+    rows, columns, groups = [row[:0]], [row[:0]], []
     for group in range(int(colour.max(initial=-1)) + 1):
         of_group = colour == group
         for local in range(int(size[of_group].max(initial=0))):
-            v = np.zeros(system.n)
-            v[offset[of_group & (size > local)] + local] = 1.0
-            constraint_values(system.packed, still, 0.0, q, v, scratch, phi, rate)
             here = of_group[owner] & (size[owner] > local)
             rows.append(row[here])
             columns.append(offset[owner[here]] + local)
-            values.append(rate[row[here]])
-    if not rows:
-        return scipy.sparse.csr_matrix((system.m, system.n))
-    entries = (np.concatenate(values), (np.concatenate(rows), np.concatenate(columns)))
+            groups.append((offset[of_group & (size > local)] + local, row[here]))
+    return np.concatenate(rows), np.concatenate(columns), groups
+
+
+def jacobian_values(system: System, q: Array) -> Array:
+    """Return the values of `jacobian_entries` at q.
+
+    A column is Phi' with unit velocity of one coordinate. Bodies that share no row are moved at once, so that the
+    number of evaluations does not grow with the number of bodies. This holds for all kinds of joints.
+    """
+    still, scratch = no_signals(system.packed), make_scratch(system.packed)
+    phi, rate = np.zeros((2, system.m))
+    values = [rate[:0]]
+    for moved, rows in jacobian_entries(system)[2]:
+        v = np.zeros(system.n)
+        v[moved] = 1.0
+        constraint_values(system.packed, still, 0.0, q, v, scratch, phi, rate)
+        values.append(rate[rows])
+    return np.concatenate(values)
+
+
+def sparse_jacobian(system: System, q: Array) -> scipy.sparse.csr_matrix:
+    """Return Phi_q (m, n) at q; zero in the rows of springs and dampers."""
+    entries = jacobian_values(system, q), jacobian_entries(system)[:2]
     jacobian = scipy.sparse.csr_matrix(entries, shape=(system.m, system.n))
     jacobian.eliminate_zeros()
     return jacobian

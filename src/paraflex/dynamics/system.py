@@ -20,6 +20,8 @@ from .coordinates import BodyCoordinates, Marker, PlacedBodies, body_coordinates
 from .damping import damping_matrix
 from .packing import pack_system
 
+# Up to this number of rows a dense factorisation with pivoting is as fast as a sparse one, and more accurate.
+DENSE_ROWS = 400
 # Damping ratio below which a vibration counts as undamped: it loses 1.2 % of its amplitude in a period.
 _HARDLY_DAMPED = 2e-3
 # Angular frequency of vibrations if none is known [rad/s].

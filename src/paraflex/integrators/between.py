@@ -148,12 +148,11 @@ def _largest_loads(system: System, solution: Solution) -> Iterator[tuple[str, st
         return
     names = [joint.name for joint in system.mechanism.joints]
     if names:
-
-        def force(q: Array, v: Array, a: Array, multipliers: Array) -> Array:
-            none = np.zeros((len(q), len(system.mechanism.motors)))
-            return np.max(np.hypot(*np.moveaxis(joint_loads(system, names, q, multipliers, none).force, 2, 0)), axis=1)
-
-        yield "the force in a joint", "N", _largest(force, motion, 2 * len(names))
+        none, largest = np.zeros((len(solution.q), len(system.mechanism.motors))), np.zeros(len(solution.q))
+        for name in names:
+            force = joint_loads(system, [name], solution.q, multipliers, none).force[:, 0]
+            np.maximum(largest, np.hypot(*force.T), out=largest)
+        yield "the force in a joint", "N", largest
     for one, effort in zip(system.mechanism.prescribed, drive_torques(system, multipliers).T, strict=True):
         unit = "N" if system.mechanism.slides(one.joint) else "N m"
         yield f"the {'force' if unit == 'N' else 'torque'} of prescribed.{one.name}", unit, np.abs(effort)

@@ -19,6 +19,7 @@ from paraflex.dynamics import (
     still_signals,
 )
 from paraflex.dynamics.points import point_motion
+from paraflex.dynamics.rank import DENSE_ROWS
 from paraflex.errors import AssemblyError, InputError, Moment, NumericalError, UnreachablePathError
 from paraflex.kernel.arrays import apart
 from paraflex.kernel.closure import LOOPS_CLOSED, LOOPS_SINGULAR, close_path, make_closure_scratch, task_values
@@ -29,6 +30,7 @@ from paraflex.mechanism.members import TASK_COORDINATES
 from paraflex.mechanism.poses import local_points
 from .paths import KnownPath, Path, PathMotion, turning_of
 from .reach import PoseSearch, Shortfall
+from .sparse_closure import SparseClosure
 
 # Closure proceeds along the path in steps no longer than this [s], for any requested times.
 _LONGEST_STEP = 1e-3
@@ -352,6 +354,8 @@ class PathClosure:
         q, v, a = apart((3, k, n))
         basis = apart((k, n, self.coordinates.size))
         q[0] = pose
+        if self.system.m > DENSE_ROWS:
+            return *self._sparse.run(times, target, q, v, a, basis), (q, v, a, basis)
         scratch = make_closure_scratch(self.packed, self.coordinates.size, self.signals.start.size)
         given = (self.packed, self.signals, self.marker, self.coordinates, times, target)
         status, index = close_path(*given, q, v, a, basis, scratch)
@@ -423,6 +427,10 @@ class PathClosure:
     def distances(self, path: Path, times: Array, pose: Array) -> Shortfall:
         """Return the distances of a path from the workspace at some times, from a pose or the assemblies that close."""
         return self.reach.shortfall(times, self.target(path, times)[:, 0], pose, self._other_poses)
+
+    @cached_property
+    def _sparse(self) -> SparseClosure:
+        return SparseClosure(self)
 
     @cached_property
     def _other_poses(self) -> list[Array]:

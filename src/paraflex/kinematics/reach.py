@@ -2,14 +2,17 @@
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
+import scipy
 
 from paraflex.arrays import Array, Indices, Mask
 from paraflex.dynamics import System, material_angle
 from paraflex.dynamics.points import marker_place
 from paraflex.dynamics.projection import LeastChange, assemble, closed, shortened
+from paraflex.dynamics.rank import DENSE_ROWS
+from paraflex.dynamics.sparse import Saddle, sparse_jacobian
 from paraflex.kernel.packed import Signals
 from paraflex.mechanism import PointRef
 
@@ -100,6 +103,10 @@ class Shortfall:
         order = np.argsort(np.concatenate([self.t, more.t]), kind="stable")
         names = ("t", "desired", "distance", "turn", "own")
         return Shortfall(*(np.concatenate([getattr(self, name), getattr(more, name)])[order] for name in names))
+
+
+def _nearest(rows: scipy.sparse.csr_matrix) -> Saddle:
+    return Saddle(scipy.sparse.csr_matrix(scipy.sparse.identity(rows.shape[1])), rows)
 
 
 @dataclass(frozen=True)
@@ -215,23 +222,41 @@ class PoseSearch:
         return float(off @ off)
 
     def _change_at(self, q: Array) -> LeastChange:
-        """Return the dimensionless least change; dense, as a search closes thousands of poses."""
-        jacobian, units, row_units = self.system.dimensionless_jacobian(q), self.system.units, self.system.row_units
+        """Return the dimensionless least change; dense for few rows, as a search closes thousands of poses."""
+        jacobian, units, row_units = self._jacobian(q), self.system.units, self.system.row_units
+        if not isinstance(jacobian, np.ndarray):
+            nearest = _nearest(jacobian)
+            return lambda phi: units * nearest.solve(r=phi / row_units)[0]
         return lambda phi: units * np.linalg.lstsq(jacobian, phi / row_units, rcond=_DEPENDENT)[0]
 
-    def _slope(self, q: Array, goal: Array, multipliers: Array | None = None) -> tuple[Array, Array]:
+    def _jacobian(self, q: Array) -> Any:
+        """Return the dimensionless Phi_q, a dense array or, for many rows, a sparse matrix."""
+        if self.system.m <= DENSE_ROWS:
+            return self.system.dimensionless_jacobian(q)
+        rows, columns = scipy.sparse.diags(1.0 / self.system.row_units), scipy.sparse.diags(self.system.units)
+        return scipy.sparse.csr_matrix(rows @ sparse_jacobian(self.system, q) @ columns)
+
+    def _slope(self, q: Array, goal: Array, multipliers: Array | None = None) -> tuple[Array, Any]:
         """Return the gradient of half the squared distance, or of the Lagrangian with multipliers; and Phi_q."""
-        (values, rows), jacobian = self._task(q), self.system.dimensionless_jacobian(q)
+        (values, rows), jacobian = self._task(q), self._jacobian(q)
         slope = (rows * self.system.units / self._units[:, None]).T @ ((values - goal) / self._units)
         return (slope if multipliers is None else slope + jacobian.T @ multipliers), jacobian
+
+    def _admissible(self, jacobian: Any, slope: Array) -> tuple[Array, Array]:
+        """Return a basis (n, f) of the null space of Phi_q, and the multipliers (m,) that balance a slope best."""
+        if not isinstance(jacobian, np.ndarray):
+            nearest, freedoms = _nearest(jacobian), self.system.n - self.system.n_constraints
+            wishes = np.random.default_rng(0).standard_normal((self.system.n, freedoms))
+            found = nearest.solve(wishes, np.zeros((self.system.m, freedoms)))[0]
+            return np.linalg.qr(found)[0], nearest.solve(-slope)[1]
+        left, sizes, right = np.linalg.svd(jacobian)
+        rank = int(np.sum(sizes > _DEPENDENT * np.max(sizes, initial=0.0)))
+        return right[rank:].T, -left[:, :rank] @ ((right[:rank] @ slope) / sizes[:rank])
 
     def _step(self, goal: Array, q: Array, longest: float) -> Array:
         """Return a dimensionless step towards the nearest pose within the null space of the constraints."""
         slope, jacobian = self._slope(q, goal)
-        left, sizes, right = np.linalg.svd(jacobian)
-        rank = int(np.sum(sizes > _DEPENDENT * np.max(sizes, initial=0.0)))
-        free = right[rank:].T
-        multipliers = -left[:, :rank] @ ((right[:rank] @ slope) / sizes[:rank])
+        free, multipliers = self._admissible(jacobian, slope)
         here = slope + jacobian.T @ multipliers
         columns = [
             self._slope(q + self.system.units * _DIFFERENCE * column, goal, multipliers)[0] - here for column in free.T

@@ -102,7 +102,7 @@ def check_relations(mechanism: Members) -> None:
 
 def check_assemblies(mechanism: Members) -> None:
     """Check that assemblies refer to bodies and points of bodies, and determine the angle of every body."""
-    bodies = [body.name for body in mechanism.bodies]
+    bodies = {body.name: body for body in mechanism.bodies}
     for assembly in mechanism.assemblies:
         for name, angle in assembly.angles.items():
             known(name, bodies, f"assembly.{assembly.name}", "body")

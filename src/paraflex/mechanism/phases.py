@@ -2,6 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import replace
+from functools import cache
 from math import cos, dist, sin
 from typing import Any
 
@@ -12,6 +13,8 @@ from .members import Members
 from .poses import Place, Pose, approximate_poses, local_points, placed_poses
 from .quantities import positive
 
+Poses = Callable[[], dict[str, Pose]]
+
 
 def with_phases(mechanism: Members) -> dict[str, tuple[Any, ...]]:
     """Return the joints and relations of a mechanism by field, with their missing lengths and phases filled in.
@@ -21,34 +24,40 @@ def with_phases(mechanism: Members) -> dict[str, tuple[Any, ...]]:
     InputError
         A length or phase is not given, and no assembly determines it.
     """
+    first = mechanism.assemblies[:1]
+    poses = cache(lambda: approximate_poses(mechanism, *first) | placed_poses(mechanism, *first))
     found: dict[str, tuple[Any, ...]] = {
-        "joints": tuple(_with_length(mechanism, one) if one.length is None else one for one in mechanism.joints)
+        "joints": tuple(_with_length(mechanism, poses, one) if one.length is None else one for one in mechanism.joints)
     }
     for name, group in groups_of(type(mechanism)).items():
         if group.relates:
             members = getattr(mechanism, name)
-            found[name] = tuple(_with_phase(mechanism, group, one) if one.phase is None else one for one in members)
+            found[name] = tuple(
+                _with_phase(mechanism, poses, group, one) if one.phase is None else one for one in members
+            )
     return found
 
 
-def _with_length(mechanism: Members, joint: Any) -> Joint:
+def _with_length(mechanism: Members, poses: Poses, joint: Any) -> Joint:
     """Return a distance joint with the distance of its points in the first assembly."""
     field = f"joint.{joint.name}.length"
-    a, b = _in_first(mechanism, "the length", field, "give it in m", _place, (joint.a, joint.b))
+    a, b = _in_first(mechanism, poses, "the length", field, "give it in m", _place, (joint.a, joint.b))
     positive(dist(a, b), field, f"m: {joint.a} and {joint.b} coincide in assembly {mechanism.assemblies[0].name}")
     return replace(joint, length=dist(a, b))
 
 
-def _with_phase(mechanism: Members, group: Group, relation: Any) -> Any:
+def _with_phase(mechanism: Members, poses: Poses, group: Group, relation: Any) -> Any:
     """Return a relation with its phase in the first assembly."""
     field, shares = f"{group.table}.{relation.name}.phase", relation.shares
     joints = [mechanism.joint(name) for name in shares]
     remedy = "give it in rad (in m where the second joint slides)"
-    values = _in_first(mechanism, f"a {group.noun}'s phase", field, remedy, joint_value, joints)
+    values = _in_first(mechanism, poses, f"a {group.noun}'s phase", field, remedy, joint_value, joints)
     return replace(relation, phase=sum(weight * value for weight, value in zip(shares.values(), values, strict=True)))
 
 
-def _in_first(mechanism: Members, what: str, field: str, remedy: str, value: Callable[..., Any], of: Any) -> list[Any]:
+def _in_first(
+    mechanism: Members, poses: Poses, what: str, field: str, remedy: str, value: Callable[..., Any], of: Any
+) -> list[Any]:
     """Return values of points or joints in the first assembly, for a field that is not given."""
     if not mechanism.assemblies:
         raise InputError(
@@ -56,8 +65,7 @@ def _in_first(mechanism: Members, what: str, field: str, remedy: str, value: Cal
             remedy=f"{remedy}, or an [assembly.NAME] table",
         )  # fmt: skip
     assembly = mechanism.assemblies[0]
-    poses = approximate_poses(mechanism, assembly) | placed_poses(mechanism, assembly)
-    found = [value(mechanism, one, poses) for one in of]
+    found = [value(mechanism, one, poses()) for one in of]
     if None in found:
         raise InputError(
             f"{what} is not given, and assembly {assembly.name} does not determine it",

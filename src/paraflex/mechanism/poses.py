@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from heapq import heappop, heappush
 from math import atan2, cos, hypot, sin
 
 from paraflex.arguments import checked_arguments
@@ -81,19 +82,33 @@ def _from_points(
     """Return poses with positions, by iteration over joints and bodies; sliding joints are used last, if at all."""
     poses: dict[str, Pose] = {}
     known = {PointRef(GROUND, name): place for name, place in mechanism.ground.items()} | dict(points)
+    locals_of = [local_points(body) for body in mechanism.bodies]
+    index = {body.name: i for i, body in enumerate(mechanism.bodies)}
     # Other joints do not determine the position of a point.
     for determining in ({"points"}, {"points", "axis"})[: 1 + sliding]:
-        before = -1
-        while before < len(known) + len(poses):
-            before = len(known) + len(poses)
-            for joint in mechanism.joints:
-                if determining.intersection(joint.holds):
-                    for one, other in ((joint.a, joint.b), (joint.b, joint.a)):
-                        if one in known:
-                            known.setdefault(other, known[one])
-            for body in mechanism.bodies:
+        joints = [joint for joint in mechanism.joints if determining.intersection(joint.holds)]
+        joints_at: dict[PointRef, list[int]] = {}
+        for k, joint in enumerate(joints):
+            for ref in (joint.a, joint.b):
+                joints_at.setdefault(ref, []).append(k)
+        # Joints and bodies with a point that became known, each in the order of the mechanism.
+        waiting, changed = list(range(len(joints))), set(range(len(mechanism.bodies)))
+        while waiting or changed:
+            later: set[int] = set()
+            while waiting:
+                k = heappop(waiting)
+                for one, other in ((joints[k].a, joints[k].b), (joints[k].b, joints[k].a)):
+                    if one in known and other not in known:
+                        known[other] = known[one]
+                        changed.update({index[other.body]} if other.body in index else ())
+                        for neighbour in joints_at[other]:
+                            if neighbour > k:
+                                heappush(waiting, neighbour)
+                            else:
+                                later.add(neighbour)
+            for i in sorted(changed):
+                body, local = mechanism.bodies[i], locals_of[i]
                 if body.name not in poses:
-                    local = local_points(body)
                     found = {name: known[ref] for name in local if (ref := PointRef(body.name, name)) in known}
                     if sliding:
                         # One point only: approximate angles leave a gap, which is then at a single joint.
@@ -101,7 +116,10 @@ def _from_points(
                     if found and (pose := _fit(local, found, angles.get(body.name))):
                         poses[body.name] = pose
                         for name, place in local.items():
-                            known.setdefault(PointRef(body.name, name), pose.place_of(place))
+                            ref = PointRef(body.name, name)
+                            known.setdefault(ref, pose.place_of(place))
+                            later.update(joints_at.get(ref, ()))
+            waiting, changed = sorted(later), set()
     return poses
 
 

@@ -107,11 +107,18 @@ def _springs(mechanism: Mechanism, size: float) -> Iterator[Finding]:
 def _places(mechanism: Mechanism) -> dict[PointRef, PointRef]:
     """Return for each point of a pin or weld a representative of all points at its position."""
     place: dict[PointRef, PointRef] = {}
+
+    def representative(point: PointRef) -> PointRef:
+        while (at := place.setdefault(point, point)) != point:
+            # Paths to representatives are halved, so that long chains take no longer.
+            place[point] = place[at]
+            point = at
+        return point
+
     for joint in mechanism.joints:
         if "points" in joint.holds:
-            one, other = place.setdefault(joint.a, joint.a), place.setdefault(joint.b, joint.b)
-            place = {point: one if at == other else at for point, at in place.items()}
-    return place
+            place[representative(joint.b)] = representative(joint.a)
+    return {point: representative(point) for point in tuple(place)}
 
 
 def _damped(mechanism: Mechanism) -> Iterator[Finding]:

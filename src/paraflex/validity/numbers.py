@@ -31,6 +31,8 @@ MODULUS = (1e5, 2e12)
 DENSITY = (10.0, 2.3e4)
 # No solid denser than the first [kg/m^3] has a modulus below the second [Pa].
 HEAVY, SOFT = 2000.0, 1e9
+# Number of points up to which all distances between them are computed.
+_MANY_POINTS = 50
 # Lengths of a mechanism [m]: of micromechanics and of the largest machines.
 SIZE = (1e-5, 100.0)
 # Largest ratio of the longest to the shortest link of a mechanism.
@@ -136,7 +138,13 @@ def body_length(body: Body) -> float:
 
 
 def _extent(places: Iterable[Sequence[float]]) -> float:
-    return max((math.dist(a, b) for a, b in combinations(list(places), 2)), default=0.0)
+    points = list(places)
+    if len(points) > _MANY_POINTS:
+        # A point nearer to all corners of the box around them than the box is long is no end of the largest distance.
+        x = np.array(points)
+        low, high = x.min(axis=0), x.max(axis=0)
+        points = x[np.hypot(*np.maximum(x - low, high - x).T) >= (1.0 - 1e-9) * np.max(high - low)].tolist()
+    return max((math.dist(a, b) for a, b in combinations(points, 2)), default=0.0)
 
 
 def _lengths(mechanism: Mechanism, size: float) -> Iterator[Finding]:
