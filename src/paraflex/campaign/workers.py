@@ -10,7 +10,7 @@ import os
 import sys
 import threading
 import time
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import BrokenExecutor, CancelledError, Executor, Future, ProcessPoolExecutor, ThreadPoolExecutor
 from contextlib import suppress
 from importlib import import_module
@@ -35,6 +35,7 @@ _GONE = "the cluster no longer answers; run the same command again: it goes on f
 _ENDED = "the executor no longer takes calls; run the study again with a new one: it goes on from there"
 # Switch interval of Python's threads [s], short because runs release the GIL and request it again often.
 _SWITCH = 2e-4
+_shared: list[Callable[[], object]] = []  # Calls of `share_out`, for copies of this process.
 
 T = TypeVar("T")
 R = TypeVar("R")
@@ -139,10 +140,11 @@ class Threads(Engine):
 
 
 class Processes(Engine):
-    """Processes on this machine."""
+    """Processes on this machine, spawned or, if `copies` is True, forked."""
 
-    def __init__(self, workers: int) -> None:
+    def __init__(self, workers: int, *, copies: bool = False) -> None:
         super().__init__(workers)
+        self._method = "fork" if copies else "spawn"
         self._pool = self._start()
 
     def submit(self, function: Callable[..., Any], *arguments: Any) -> Future[Any]:
@@ -166,8 +168,7 @@ class Processes(Engine):
         self._pool.shutdown(wait=False, cancel_futures=True)
 
     def _start(self) -> ProcessPoolExecutor:
-        # Processes are spawned, not forked, because threads of this process may hold locks.
-        context = multiprocessing.get_context("spawn")
+        context = multiprocessing.get_context(self._method)
         with starting_processes():
             # The constructor starts a process that tracks locks.
             return ProcessPoolExecutor(self.workers, mp_context=context, initializer=end_with_parent)
@@ -254,9 +255,7 @@ class Given(Engine):
 
     def restart(self) -> None:
         """Raise `LostCluster`: an executor that is broken cannot be restarted here."""
-        raise LostCluster(
-            "the executor no longer takes calls; run the study again with a new one: it goes on from there"
-        )
+        raise LostCluster(_ENDED)
 
     def close(self, *, abandon: bool = False) -> None:
         """Cancel the calls that have not begun."""
@@ -362,6 +361,30 @@ def outcomes(engine: Engine, function: Callable[..., R], tasks: Iterable[T]) -> 
             running = {}
             engine.restart()
             yield from _one_by_one(engine, function, suspects)
+
+
+def share_out(calls: Sequence[Callable[[], object]]) -> None:
+    """Make independent calls that write files, in forked copies of this process unless it has several threads."""
+    left = set(range(len(calls)))
+    # Threads may hold locks, and libraries of macOS do not survive a fork.
+    if len(calls) > 1 and sys.platform == "linux" and threading.active_count() == 1:
+        _shared[:], watched = calls, Calls()
+        with Processes(min(len(calls), len(os.sched_getaffinity(0))), copies=True) as engine:
+            number = {watched.submit(_submit, engine, _make, k): k for k in left}
+            while not all(one.done() for one in number):
+                watched.done()
+            left -= {k for one, k in number.items() if not one.exception() and one.result()}
+        _shared.clear()
+    for k in sorted(left):
+        calls[k]()
+
+
+def _make(k: int) -> bool:
+    """Make a shared call in a copy of this process; if it fails, this process makes it again and raises its error."""
+    with suppress(Exception):
+        _shared[k]()
+        return True
+    return False
 
 
 def _one_by_one(engine: Engine, function: Callable[..., R], tasks: list[T]) -> Iterator[tuple[T, R | LostWorker]]:

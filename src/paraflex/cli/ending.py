@@ -4,11 +4,13 @@ import json
 import time
 from collections.abc import Callable, Iterable, Mapping
 from contextlib import nullcontext
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import xarray as xr
 
+from paraflex.campaign.workers import share_out
 from paraflex.errors import OutputError
 from paraflex.findings import Finding
 from paraflex.folders import RESULT_KINDS, ResultsFolder
@@ -75,14 +77,17 @@ def write_drawn(results: xr.Dataset | Mapping[str, Any], folder: ResultsFolder, 
     """Add figures, and the report of a dataset, to results already written, which an interruption leaves intact."""
     try:
         with folder.added_files() as new:
-            if drawn.figures:
-                from paraflex.plots import save_figures  # its import takes a second
-
-                save_figures(results, new / "figures")
+            calls: list[Callable[[], object]] = []
             if drawn.report and isinstance(results, xr.Dataset):
-                from .report import page_of, save_page  # as does this one
+                from .report import page_of, save_page  # its import takes a second
 
-                save_page(page_of(results, folder.path), new / "report.html")
+                calls.append(lambda: save_page(page_of(results, folder.path), new / "report.html"))
+            if drawn.figures:
+                from paraflex.plots.save import ACCOMPANYING, accompanying, write_figures  # as does this one
+
+                write = partial(write_figures, folder=new / "figures", formats=ACCOMPANYING, dpi=None, force=True)
+                calls += [partial(write, [figure]) for figure in accompanying(results, new / "figures")]
+            share_out(calls)
     except KeyboardInterrupt as interrupt:
         interrupt.args = (f"the numbers are in {folder.path}; {_LATER}",)
         raise

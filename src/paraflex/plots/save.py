@@ -2,12 +2,14 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 import xarray as xr
 
 from paraflex.arguments import checked_arguments
+from paraflex.campaign.workers import share_out
 from paraflex.errors import InputError
 from paraflex.folders import added_to
 from paraflex.mechanism.quantities import all_known
@@ -17,6 +19,8 @@ from .layout import column_width
 from .planned import PlannedFigure, drawings, figures_of
 from .sources import Source, kind_of_numbers
 from .style import FIGURE_FORMATS, write_figure
+
+ACCOMPANYING = ("png", "svg")
 
 
 @checked_arguments()
@@ -50,7 +54,11 @@ def save_figures(results: xr.Dataset | Mapping[str, Any], folder: str | Path, mo
     OutputError
         The folder cannot be written.
     """
-    folder = Path(folder)
+    return write_figures(accompanying(results, Path(folder), mode), Path(folder), ACCOMPANYING, dpi=None, force=True)
+
+
+def accompanying(results: xr.Dataset | Mapping[str, Any], folder: Path, mode: str | None = None) -> list[PlannedFigure]:
+    """Return the figures that `save_figures` writes."""
     kind = kind_of(results) if isinstance(results, xr.Dataset) else kind_of_numbers(results)
     if not kind:
         raise InputError("not the numbers of a result", field="results", remedy="give what its to_dict() returns")
@@ -60,7 +68,7 @@ def save_figures(results: xr.Dataset | Mapping[str, Any], folder: str | Path, mo
         named, one_of_many = replace(figure, name=figure.written_as), figure.takes in ("models", "run")
         for drawing in drawings(source, figure, [mode] if mode is not None and figure.takes == "mode" else ()):
             drawn.append(replace(drawing, figure=named, of=drawing.of if one_of_many else ""))
-    return write_figures(drawn, folder, ("png", "svg"), dpi=None, force=True)
+    return drawn
 
 
 def write_figures(
@@ -72,7 +80,7 @@ def write_figures(
     dpi: float | None = 300.0,
     force: bool = False,
 ) -> list[Path]:
-    """Draw figures and write them, each whole or not at all.
+    """Draw figures on all processors and write them, each whole or not at all.
 
     Parameters
     ----------
@@ -110,10 +118,13 @@ def write_figures(
             remedy="add --force to write over it, or name another --output",
         )
     with added_to(folder) as new:
-        for drawing in drawn:
-            with column_width(style):
-                figure = drawing.draw()
-            for file in files[drawing.stem]:
-                with whole_file(new / file.name, field=str(new)) as unfinished:
-                    write_figure(figure, unfinished, file.suffix[1:], dpi)
+        share_out([partial(_write, drawing, new, formats, style, dpi) for drawing in drawn])
     return [file for drawing in drawn for file in files[drawing.stem]]
+
+
+def _write(drawing: PlannedFigure, folder: Path, formats: Sequence[str], style: str | None, dpi: float | None) -> None:
+    with column_width(style):
+        figure = drawing.draw()
+    for name in formats:
+        with whole_file(folder / f"{portable_name(drawing.stem)}.{name}", field=str(folder)) as unfinished:
+            write_figure(figure, unfinished, name, dpi)
