@@ -193,6 +193,26 @@ for command in ("run", "verify", "motion", "linear"):
     assert found == ["run", "verify", "motion", "linear"]
 
 
+STUDY = """
+import sys
+from paraflex.__main__ import main
+out, *names = sys.argv[1:]
+sys.argv[1:] = ["run", "--mode", "++++", "--duration", "0.02", "--samples", "11", "--out", out]
+try:
+    main()
+except SystemExit:
+    pass
+print("imported:", *(name for name in names if sys.modules.get(name)))
+"""
+
+
+def test_a_study_imports_nothing_that_others_need(tmp_path):
+    unneeded = [f"scipy.{name}" for name in ("integrate", "interpolate", "optimize", "spatial", "special")]
+    found = python("-c", STUDY, str(tmp_path / "out"), *unneeded, "plotly")
+    assert found[-1] == "imported:"
+    assert {"report.html", "figures", "results.nc"} <= {file.name for file in (tmp_path / "out").iterdir()}
+
+
 def test_imports_compile_nothing(tmp_path):
     kernels, signatures = python("-c", EVERYTHING, NUMBA_CACHE_DIR=str(tmp_path))[-1].split()
     assert int(kernels) > 50

@@ -16,7 +16,6 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 import scipy
-from scipy.interpolate import make_interp_spline
 
 from paraflex.arguments import checked_arguments
 from paraflex.arrays import Array
@@ -190,7 +189,8 @@ class _Held:
     """Augmented system (x, u, unit u')' = M(t) (x, u, unit u'), with M(t) interpolated by splines."""
 
     def __init__(self, times: Array, A: Array, B: Array, unit: float) -> None:
-        self._A, self._B = (make_interp_spline(times, each, k=min(3, times.size - 1)) for each in (A, B))
+        degree = min(3, times.size - 1)
+        self._A, self._B = (scipy.interpolate.make_interp_spline(times, each, k=degree) for each in (A, B))
         n, m = B.shape[1:]
         self._inputs = np.hstack([np.zeros((m, n + m)), np.eye(m) / unit])
         self._last = np.zeros((m, n + 2 * m))

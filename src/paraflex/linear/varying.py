@@ -16,7 +16,7 @@ from functools import cached_property
 from typing import TYPE_CHECKING, NamedTuple, TypeVar
 
 import numpy as np
-from scipy.interpolate import make_interp_spline
+import scipy
 
 from paraflex.arguments import checked_arguments
 from paraflex.arrays import Array
@@ -152,7 +152,7 @@ class VaryingModel:
         size = np.linalg.norm(there @ self.B[0], axis=0)
         size = np.where(size > 0.0, size, 1.0)
         found = transitions(self.times, there @ self.A @ back, there @ self.B / size, times, hold)
-        C, D = (make_interp_spline(self.times, each, k=3)(times) for each in (self.C, self.D))
+        C, D = (scipy.interpolate.make_interp_spline(self.times, each, k=3)(times) for each in (self.C, self.D))
         return SampledModel(
             self.states, self.inputs, self.outputs, times, hold, Phi=back @ found.Phi @ there,
             Gamma=back @ found.Gamma * size, Gamma_next=back @ found.Gamma_next * size, C=C, D=D, error=found.error,

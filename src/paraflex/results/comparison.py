@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import scipy
 import xarray as xr
-from scipy.interpolate import CubicSpline
 
 from paraflex.arguments import checked_arguments
 from paraflex.arrays import Array
@@ -236,7 +236,7 @@ def on_times_of(first: xr.Dataset, second: xr.Dataset, name: str) -> tuple[Array
     if there_until < _FEWEST:
         return time[:0], here[:0], here[:0]
     inside = (time >= other[0]) & (time <= other[there_until - 1])
-    there = CubicSpline(other[:there_until], there[:there_until])(time[inside])
+    there = scipy.interpolate.CubicSpline(other[:there_until], there[:there_until])(time[inside])
     return time[inside], here[inside], there
 
 
