@@ -65,6 +65,11 @@ def test_operations_are_those_that_the_kernels_do(task, geometry):
     # Entries that are zero for straight beams count as well: the formulas are those of any body.
     columns, products = dense(p.columns, p.bodies["width"], p), dense(p.products, 2 * p.bodies["stride"], p)
     p = p._replace(columns=columns, products=products)
+    # So do coordinates that move mass points in one direction only.
+    bodies, nf = p.bodies.copy(), p.bodies["nf"]
+    bodies["along"] = 2 * (np.cumsum(nf) - nf)
+    bodies["across"], bodies["across_end"] = bodies["along"] + nf, bodies["along"] + 2 * nf
+    p = p._replace(bodies=bodies, kinds=np.concatenate([np.tile(np.arange(n), 2) for n in nf]))
     done = {
         "equations": operations_of(equations, p, run.problem.signals, 0.01, (1.0, 40.0, 400.0), *motion, ws),
         "solve": operations_of(solve_system, p, ws, ws.x, ws.mu),

@@ -425,3 +425,19 @@ def test_a_mesh_that_cannot_be_made_names_the_field(length, points, elements, fi
         mesh_beam(length, points, elements)
     assert caught.value.field == field
     assert field in str(caught.value)
+
+
+def test_designs_with_equal_beams_share_the_mesh_and_its_shapes():
+    """What a sweep of sections would compute for each design."""
+    first, second = (mesh_beam(0.3, {"a": 0.1, "b": 0.3}, (2, 1)) for _ in range(2))
+    assert first is second
+    one, other = (mesh.with_separate_curvature([2]) for mesh in (first, second))
+    places = np.linspace(0.0, 0.3, 7)
+    assert one.shapes_at(places)[0] is other.shapes_at(places)[0]
+    assert one.transverse_powers() is other.transverse_powers()
+    assert one.shapes_at(places)[0] is not first.shapes_at(places)[0]
+    with pytest.raises(ValueError, match="read-only"):
+        one.shapes_at(places)[1][0] = 1.0
+    many = np.linspace(0.0, 0.3, 1201)
+    np.testing.assert_allclose(one.shapes_at(many)[0][::200], one.shapes_at(places)[0], rtol=0.0, atol=1e-12)
+    assert one.shapes_at(many)[0] is not one.shapes_at(many)[0]

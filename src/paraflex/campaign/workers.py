@@ -307,14 +307,17 @@ def open_engine(engine: str | Engine | Executor, workers: int | None = None, clu
         raise InputError("the cluster has workers of its own", field="--workers", value=workers, remedy=remedy)
     if workers is not None and workers < 1:
         raise InputError("must be positive", field="--workers", value=workers, remedy="give 2")
-    # Count the processors that this process may use, because batch systems assign only a part of the machine.
-    own = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
-    count = workers or getattr(engine, "_max_workers", None) or own or 1
+    count = workers or getattr(engine, "_max_workers", None) or _processors()
     if isinstance(engine, Executor):
         return Given(engine, count)
     if engine == THREADS:
         return Threads(count)
     return Processes(count) if engine == PROCESSES else Dask(count, cluster)
+
+
+def _processors() -> int:
+    """Return the number of processors that this process may use: batch systems assign only a part of the machine."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
 def outcomes(engine: Engine, function: Callable[..., R], tasks: Iterable[T]) -> Iterator[tuple[T, R | LostWorker]]:
@@ -369,7 +372,7 @@ def share_out(calls: Sequence[Callable[[], object]]) -> None:
     # Threads may hold locks, and libraries of macOS do not survive a fork.
     if len(calls) > 1 and sys.platform == "linux" and threading.active_count() == 1:
         _shared[:], watched = calls, Calls()
-        with Processes(min(len(calls), len(os.sched_getaffinity(0))), copies=True) as engine:
+        with Processes(min(len(calls), _processors()), copies=True) as engine:
             number = {watched.submit(_submit, engine, _make, k): k for k in left}
             while not all(one.done() for one in number):
                 watched.done()

@@ -1,7 +1,7 @@
 """Coordinates and material points of a body: the only module that maps slices of q to bodies."""
 
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cache, cached_property
 
 import numpy as np
 
@@ -252,6 +252,12 @@ def transverse_rows(nodes: Array, pieces: Array, place: Array, derivative: int) 
 
 def piece_rows(pieces: Array, element: Indices, z: Array, derivative: int = 0) -> Array:
     """Evaluate polynomials of elements (see `transverse_pieces`) or a derivative at distances z from first nodes."""
-    coefficients = np.polynomial.polynomial.polyder(np.eye(pieces.shape[1]), derivative)
+    coefficients = _derivative(pieces.shape[1], derivative)
     powers = [sum(c * z**p for p, c in enumerate(column) if c) + 0.0 * z for column in coefficients.T]
     return np.einsum("...p,...pj->...j", np.stack(powers, axis=-1), pieces[element])
+
+
+@cache
+def _derivative(terms: int, order: int) -> Array:
+    """Return the matrix of the derivative of polynomials with so many terms, of ascending powers."""
+    return np.array(np.polynomial.polynomial.polyder(np.eye(terms), order), dtype=float)

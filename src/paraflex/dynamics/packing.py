@@ -31,7 +31,7 @@ from .inputs import inputs_of
 from .scale import mechanism_size
 
 # Displacements of mass points in one direction below this part of those in the other are rounding.
-_ROUNDING = 1e-12
+_ROUNDING = 1e-8
 # Fields of a line that a spring between points defines.
 _OF_SPRINGS = ("stiffness", "length", "damping")
 
@@ -233,7 +233,10 @@ def _kinds(body: BodyCoordinates) -> tuple[Indices, Indices]:
     if body.points is None:
         return np.zeros(0, dtype=int), np.zeros(0, dtype=int)
     x, y = np.max(np.abs(body.points.N), axis=0)
-    return np.flatnonzero(x > _ROUNDING * y), np.flatnonzero(y > _ROUNDING * x)
+    # Modes do either, up to rounding; other coordinates, and modes of one frequency, may do both.
+    if body.points.mixed or np.any(np.minimum(x, y) > _ROUNDING * np.maximum(x, y)):
+        return np.arange(x.size), np.arange(x.size)
+    return np.flatnonzero(x > y), np.flatnonzero(x <= y)
 
 
 def _columns(bodies: tuple[BodyCoordinates, ...], markers: list[Marker]) -> list[Array]:

@@ -131,12 +131,12 @@ def least_change(metric: Sparse, rows: Sparse, units: Array, damping: float = 0.
     damping : float
         Damping, as a fraction of the mean diagonal entry of rows metric^-1 rows^T; none by default.
     """
-    rows = Sparse(scipy.sparse.diags(1.0 / units) @ rows)
     if units.size > DENSE_ROWS:
+        rows = Sparse(scipy.sparse.diags(1.0 / units) @ rows)
         mean = float(np.mean(rows.multiply(rows) @ (1.0 / np.asarray(metric.diagonal(), dtype=float))))
         saddle = Saddle(metric, rows, np.full(units.size, damping * mean))
         return lambda target: saddle.solve(r=target / units)[0]
-    dense = rows.toarray()
+    dense = rows.toarray() / units[:, None]
     weighted = scipy.sparse.linalg.splu(scipy.sparse.csc_matrix(metric)).solve(dense.T)
     schur = dense @ weighted
     if damping:

@@ -31,6 +31,8 @@ class MassPoints:
         Slope rows N2'.
     weights : (k, g) array
         Quadrature weights: f at the points is weights @ (slope[:g] @ u)^2.
+    mixed : bool
+        Whether coordinates may move points along the beam and across it; modes do either.
     """
 
     x: Array
@@ -39,10 +41,11 @@ class MassPoints:
     N: Array
     slope: Array
     weights: Array
+    mixed: bool = False
 
     def in_basis(self, basis: Array) -> "MassPoints":
         """Transform the points to other flexible coordinates, u_old = basis @ u_new."""
-        return replace(self, N=self.N @ basis, slope=self.slope @ basis)
+        return replace(self, N=self.N @ basis, slope=self.slope @ basis, mixed=True)
 
     def bending(self, weights: Array) -> Array:
         """Return the matrix (nf, nf) of the quadratic form f at a point with the given weights (g,)."""

@@ -22,6 +22,8 @@ from .element import (
 
 # Two points closer than this fraction of the beam are one node: a shorter element is an input error.
 COINCIDENT_POINTS = 1e-9
+# Shapes at more points are not kept.
+_MANY_POINTS = 300
 
 
 @dataclass(frozen=True)
@@ -121,18 +123,19 @@ class BeamMesh:
         (elements, places, n_nodal) array
             Rows, shared by equal meshes and read-only.
         """
-        return _rows_at(tuple(self.nodes.tolist()), self.separate, tuple(fractions), derivative, True)
+        return _rows_at(*self._key, tuple(fractions), derivative, True)
 
     def transverse_at(self, fractions: Sequence[float], derivative: int = 0) -> Array:
         """Return the transverse displacement per nodal coordinate, or a derivative: see `axial_at`."""
-        return _rows_at(tuple(self.nodes.tolist()), self.separate, tuple(fractions), derivative, False)
+        return _rows_at(*self._key, tuple(fractions), derivative, False)
 
     def transverse_powers(self) -> Array:
         """Return the transverse displacement per nodal coordinate: (elements, 6, n_nodal).
 
-        Entries are coefficients of ascending powers of the distance from the element's first node.
+        Entries are coefficients of ascending powers of the distance from the element's first node; the array is shared
+        by equal meshes and read-only.
         """
-        return np.array([self.scatter(e, transverse_powers(length)) for e, length in enumerate(np.diff(self.nodes))])
+        return _powers(*self._key)
 
     def rows_of(self, coordinate: int) -> Indices:
         """Return the indices of one of the four coordinates at every node."""
@@ -148,7 +151,17 @@ class BeamMesh:
         return N[0], slope[0]
 
     def shapes_at(self, x: Array) -> tuple[Array, Array]:
-        """Return shape matrices (k, 2, n_nodal) and slope rows (k, n_nodal) of the points at x (k,) [m]."""
+        """Return shape matrices (k, 2, n_nodal) and slope rows (k, n_nodal) of the points at x (k,) [m].
+
+        Arrays of not too many points are shared by equal meshes and read-only.
+        """
+        return self._shapes(x) if x.size > _MANY_POINTS else _shapes_at(*self._key, tuple(x.tolist()))
+
+    @property
+    def _key(self) -> tuple[tuple[float, ...], tuple[int, ...]]:
+        return tuple(self.nodes.tolist()), self.separate
+
+    def _shapes(self, x: Array) -> tuple[Array, Array]:
         elements = np.clip(np.searchsorted(self.nodes, x, side="right") - 1, 0, self.n_elements - 1)
         kind = np.result_type(x, self.nodes)
         N, slope = np.zeros((x.size, 2, self.n_nodal), kind), np.zeros((x.size, self.n_nodal), kind)
@@ -176,12 +189,31 @@ class BeamMesh:
 def _rows_at(
     nodes: tuple[float, ...], separate: tuple[int, ...], fractions: tuple[float, ...], derivative: int, axial: bool
 ) -> Array:
-    mesh = BeamMesh(np.array(nodes), np.arange(len(nodes) - 1), {}, separate)
+    mesh = _mesh_at(nodes, separate)
     lengths = np.diff(mesh.nodes)[:, None]
     shape = (axial_shape if axial else transverse_shape)(lengths * np.array(fractions), lengths, derivative)
-    rows = np.array([mesh.scatter(e, each) for e, each in enumerate(shape)])
-    rows.setflags(write=False)
-    return rows
+    return _shared(np.array([mesh.scatter(e, each) for e, each in enumerate(shape)]))
+
+
+@lru_cache(maxsize=256)
+def _shapes_at(nodes: tuple[float, ...], separate: tuple[int, ...], x: tuple[float, ...]) -> tuple[Array, Array]:
+    N, slope = _mesh_at(nodes, separate)._shapes(np.array(x))
+    return _shared(N), _shared(slope)
+
+
+@lru_cache(maxsize=256)
+def _powers(nodes: tuple[float, ...], separate: tuple[int, ...]) -> Array:
+    mesh = _mesh_at(nodes, separate)
+    return _shared(np.array([mesh.scatter(e, transverse_powers(h)) for e, h in enumerate(np.diff(mesh.nodes))]))
+
+
+def _mesh_at(nodes: tuple[float, ...], separate: tuple[int, ...]) -> BeamMesh:
+    return BeamMesh(np.array(nodes), np.arange(len(nodes) - 1), {}, separate)
+
+
+def _shared(array: Array) -> Array:
+    array.setflags(write=False)
+    return array
 
 
 def mesh_beam(length: float, points: Mapping[str, float], elements: int | Sequence[int] = 1) -> BeamMesh:
@@ -199,7 +231,7 @@ def mesh_beam(length: float, points: Mapping[str, float], elements: int | Sequen
     Returns
     -------
     BeamMesh
-        Mesh of the beam, without separate curvatures.
+        Mesh of the beam, without separate curvatures; shared by equal beams.
 
     Raises
     ------
@@ -207,6 +239,13 @@ def mesh_beam(length: float, points: Mapping[str, float], elements: int | Sequen
         The length is not positive, a point lies off the beam, the number of element counts is wrong, a span has
         less than one element, or the beam has too many.
     """
+    counts = elements if isinstance(elements, int) else tuple(elements)
+    return _mesh(length, tuple(points.items()), counts)
+
+
+@lru_cache(maxsize=256, typed=True)
+def _mesh(length: float, named: tuple[tuple[str, float], ...], elements: int | tuple[int, ...]) -> BeamMesh:
+    points = dict(named)
     if not (np.isfinite(length) and length > 0.0):
         raise InputError("a beam needs a positive length", field="length", value=length, remedy="give it in metres")
     gap = COINCIDENT_POINTS * length
@@ -227,7 +266,7 @@ def mesh_beam(length: float, points: Mapping[str, float], elements: int | Sequen
     pieces = [np.linspace(a, b, n + 1)[1:] for a, b, n in zip(knots, knots[1:], counts, strict=False)]
     nodes = np.concatenate([[0.0], *pieces])
     return BeamMesh(
-        nodes=nodes,
+        nodes=_shared(nodes),
         spans=np.repeat(np.arange(len(counts)), counts),
         points={name: int(np.argmin(np.abs(nodes - x))) for name, x in points.items()},
     )

@@ -209,25 +209,31 @@ def jump_times(signals: Signals, inputs: Inputs, knots: Array) -> Array:
     knots : (k,) array
         Times to examine [s].
     """
-    looked_at = [(k, 1) for k in (*inputs.motors, *inputs.loads)] + [(k, 3) for k in inputs.prescribed]
-    return np.array([t for t in knots if any(_jumps(signals, k, t, derivatives) for k, derivatives in looked_at)])
+    jumps = np.zeros(knots.size, dtype=bool)
+    for k in (*inputs.motors, *inputs.loads):
+        jumps |= _jumps(signals, k, knots, 1)
+    for k in inputs.prescribed:
+        jumps |= _jumps(signals, k, knots, 3)
+    return knots[jumps]
 
 
-def _jumps(signals: Signals, k: int, time: float, derivatives: int) -> bool:
+def _jumps(signals: Signals, k: int, times: Array, derivatives: int) -> Mask:
+    """Return at which times (i,) a signal or one of so many derivatives, its value included, jumps."""
     first, last = int(signals.start[k]), int(signals.start[k + 1]) - 1
-    breaks = signals.breaks[first:last]
-    piece = int(np.searchsorted(breaks, time, side="right")) - 1
-    if piece < 1 or breaks[piece] != time:
-        return False
-    before, after = signals.coefficients[first + piece - 1], signals.coefficients[first + piece]
-    x = time - breaks[piece - 1]
-    largest = np.max(np.abs(signals.coefficients[first:last]), axis=0)
+    breaks, coefficients = signals.breaks[first:last], signals.coefficients[first:last]
+    piece = np.searchsorted(breaks, times, side="right") - 1
+    jumps = (piece >= 1) & (breaks[piece] == times)
+    at = piece[jumps]
+    before, after, x = coefficients[at - 1], coefficients[at], breaks[at] - breaks[at - 1]
+    largest = np.max(np.abs(coefficients), axis=0)
     # Rounding of the values is amplified in their derivatives, the more the shorter the pieces are.
     short = float(np.min(np.diff(signals.breaks[first : last + 1])))
     rounding = _ROUNDING * float(np.sum(largest * short ** np.arange(largest.size)))
+    found = np.zeros(at.size, dtype=bool)
     for order in range(derivatives):
-        left, right = (float(polyval(at, polyder(one, order))) for one, at in ((before, x), (after, 0.0)))
-        size = max(abs(left), factorial(order) * largest[order])
-        if abs(right - left) > max(_SMOOTH * size, rounding / short**order):
-            return True
-    return False
+        left = polyval(x, polyder(before, order, axis=1).T, tensor=False)
+        size = np.maximum(np.abs(left), factorial(order) * largest[order])
+        step = np.abs(factorial(order) * after[:, order] - left)
+        found |= step > np.maximum(_SMOOTH * size, rounding / short**order)
+    jumps[jumps] = found
+    return jumps

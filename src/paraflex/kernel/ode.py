@@ -135,7 +135,7 @@ def descriptor_jacobian(system, weights, y, dy, c, dropped, torques, work, direc
         direction.lam[r] = 0.0
         fill_column(direction, n, 2 * n, 2 * n + r, out)
     drop_rows(dropped, 2 * n, 2 * n, out)
-    out[2 * n + m, 2 * n + m] = c
+    out[out.shape[0] - 1, out.shape[0] - 1] = c
 
 
 @routine

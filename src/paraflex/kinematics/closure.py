@@ -430,7 +430,7 @@ class PathClosure:
 
     @cached_property
     def _sparse(self) -> SparseClosure:
-        return SparseClosure(self)
+        return SparseClosure(self.system, self.packed, self.signals, self.marker, self.coordinates)
 
     @cached_property
     def _other_poses(self) -> list[Array]:

@@ -1,17 +1,16 @@
 """Closure of large mechanisms along a path: the method of `kernel.closure` with sparse factors."""
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 import scipy
 
-from paraflex.arrays import Array
+from paraflex.arrays import Array, Indices
+from paraflex.dynamics import System
 from paraflex.dynamics.projection import second_rates
 from paraflex.dynamics.sparse import jacobian_entries, jacobian_values
 from paraflex.kernel import closure as kernel
-
-if TYPE_CHECKING:
-    from .closure import PathClosure
+from paraflex.kernel.packed import PackedSystem, Signals
 
 # Hager's estimate of a norm is a lower bound, rarely less than a third of the norm.
 _LARGEST_CHANGE = 1.0 / 3.0
@@ -21,11 +20,13 @@ _ROUNDING = 1e-15
 
 
 class SparseClosure:
-    """Loops and task coordinates of a `PathClosure`, closed with sparse factors."""
+    """Loops and task coordinates, those of a marker, closed with sparse factors; arguments as for `close_path`."""
 
-    def __init__(self, closure: "PathClosure") -> None:
-        self._closure, self._system, coordinates = closure, closure.system, closure.coordinates
-        self._marker, system = closure.packed.markers[closure.marker], closure.system
+    def __init__(
+        self, system: System, packed: PackedSystem, signals: Signals, marker: int, coordinates: Indices
+    ) -> None:
+        self._system, self._packed, self._signals, self._coordinates = system, packed, signals, coordinates
+        self._marker = packed.markers[marker]
         self._row_units = np.concatenate([system.row_units, np.where(coordinates == 2, 1.0, system.size)])
         self._own = system.bodies[self._marker["body"]].offset + np.arange(3)
         rows, columns, _ = jacobian_entries(system)
@@ -80,9 +81,9 @@ class SparseClosure:
 
     def _task(self, q: Array, v: Array | None = None) -> Array:
         """Return the task coordinates and two derivatives (3, tasks), at rest or without accelerations."""
-        out = np.zeros((3, self._closure.coordinates.size))
+        out = np.zeros((3, self._coordinates.size))
         v = self._still if v is None else v
-        kernel.task_values(self._closure.packed, self._marker, self._closure.coordinates, q, v, self._still, out)
+        kernel.task_values(self._packed, self._marker, self._coordinates, q, v, self._still, out)
         return out
 
     def _solve(self, factor: Any, right: Array) -> Array:
@@ -97,7 +98,7 @@ class SparseClosure:
     def _close(self, t: float, goal: Array, factor: Any, q: Array) -> int:
         """Close the loops at one time by Newton's method from the pose in q, with factors of a pose nearby if given."""
         for iteration in range(kernel.MAX_ITERATIONS):
-            phi, far = self._system.constraints(self._closure.signals, t, q)[0], 1.0 + max(self._moves(q))
+            phi, far = self._system.constraints(self._signals, t, q)[0], 1.0 + max(self._moves(q))
             left = np.concatenate([phi, self._task(q)[0] - goal])
             if np.max(np.abs(left) / self._row_units) <= _ROUNDING * far:
                 return kernel.LOOPS_CLOSED
@@ -134,7 +135,7 @@ class SparseClosure:
 
     def _move(self, t: float, target: Array, factor: Any, q: Array, v: Array, a: Array, basis: Array) -> None:
         """Compute velocities, accelerations and basis of closed loops, with the factors at their pose."""
-        signals, m, tasks = self._closure.signals, self._system.m, self._closure.coordinates.size
+        signals, m, tasks = self._signals, self._system.m, self._coordinates.size
         rate = np.concatenate([-self._system.constraints(signals, t, q)[1], target[1]])
         found = self._solve(factor, np.column_stack([rate, np.eye(q.size, tasks, -m)]))
         v[:], basis[:] = found[:, 0], found[:, 1:]

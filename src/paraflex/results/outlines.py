@@ -108,7 +108,8 @@ def deflections(system: System, q: Array) -> Array:
     parts = [np.zeros((len(q), 0))]
     for body, one in zip(system.described.bodies, outlines(system.described), strict=True):
         if system.body(body.name).nf:
-            bent = across_chord(outline_motion(system, one, q), one.places)
+            whole = system.parts(one.body) == (one.body,)
+            bent = across_chord((_in_frame if whole else outline_motion)(system, one, q), one.places)
             parts.append(bent if len(one.places) >= _LEAST_ON_LINE else np.full_like(bent, np.nan))
     return np.concatenate(parts, axis=1)
 
@@ -122,11 +123,17 @@ def outline_motion(system: System, drawn: Outline, q: Array) -> Array:
     if parts != (drawn.body,):
         return _of_parts(system, parts, drawn, q)
     body = system.body(drawn.body)
-    u = q[:, body.flexible]
-    local = drawn.places + np.einsum("kn,sin->ksi", u, _rows(system, body, drawn))
+    return turned(q[:, body.position], q[:, body.angle], _in_frame(system, drawn, q))
+
+
+def _in_frame(system: System, drawn: Outline, q: Array) -> Array:
+    """Return the positions of `outline_motion` in the frame of a body, which is not divided into parts."""
+    body = system.body(drawn.body)
+    u, rows = q[:, body.flexible], _rows(system, body, drawn)
+    local = drawn.places + (u @ rows.reshape(2 * len(rows), body.nf).T).reshape(len(u), *rows.shape[:2])
     if body.points is not None and body.mesh is not None:
         local[:, :, 0] -= 0.5 * slope_square_integrals(body.mesh, body.integrals.D, drawn.places[:, 0])(u)
-    return turned(q[:, body.position], q[:, body.angle], local)
+    return local
 
 
 def _of_parts(system: System, names: Sequence[str], drawn: Outline, q: Array) -> Array:

@@ -138,7 +138,8 @@ class Change:
             try:
                 near = [_described(setting, _moved(task, k, place * self.size)) for place in stencil.places]
                 # Building the systems raises errors for invalid meshes.
-                self.beside: list[System] = [build_system(each.mechanism) for each in (near[0], near[-1])]
+                ends, like = (near[0], near[-1]), self.planned.system
+                self.beside: list[System] = [build_system(each.mechanism, like) for each in ends]
                 return stencil, near
             except ParaflexError as error:
                 failure = failure or error
