@@ -162,7 +162,7 @@ def geared_chain(n: int) -> Mechanism:
         chain_of_segments(n),
         gears=tuple(Gear(f"G{i}", f"J{i - 1}", f"J{i}", 1.0) for i in range(3, n + 1)),
         motors=(Motor("first", "J1"), Motor("second", "J2")),
-        assemblies=(Assembly("bent", {f"segment{i}": i / n for i in range(1, n + 1)}),),
+        assemblies=(Assembly("curved", {f"segment{i}": i / n for i in range(1, n + 1)}),),
         end_effector=EndEffector(PointRef(f"segment{n}", "Q"), ("x", "y")),
     )
 

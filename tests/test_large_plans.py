@@ -42,7 +42,7 @@ def row(n):
     return replace(four_bars_in_a_row(n), motors=motors, end_effector=EndEffector(last, ("x",)))
 
 
-def bent_chain(n):
+def geared_chain(n):
     """A chain with equal angles between its links by gears, springs and a damper; two degrees of freedom."""
     chain = chain_of_segments(n)
     return replace(
@@ -50,7 +50,7 @@ def bent_chain(n):
         gears=tuple(Gear(f"G{i}", f"J{i - 1}", f"J{i}", 1.0) for i in range(3, n + 1)),
         dampers=(TorsionalDamper("damper", f"J{n}", 0.1),),
         motors=(Motor("first", "J1"), Motor("second", "J2")),
-        assemblies=(Assembly("bent", {f"segment{i}": i / n for i in range(1, n + 1)}),),
+        assemblies=(Assembly("curved", {f"segment{i}": i / n for i in range(1, n + 1)}),),
         end_effector=EndEffector(PointRef(f"segment{n}", "Q"), ("x", "y")),
     )
 
@@ -92,7 +92,7 @@ def densely(monkeypatch, call):
 
 
 @pytest.mark.parametrize(
-    ("mechanism", "move"), [(row(6), (0.3, 0.0)), (bent_chain(12), (-0.2, 0.1)), (tongs(9), (-0.5, 0.0))]
+    ("mechanism", "move"), [(row(6), (0.3, 0.0)), (geared_chain(12), (-0.2, 0.1)), (tongs(9), (-0.5, 0.0))]
 )
 def test_sparse_and_dense_plans_agree(mechanism, move, monkeypatch):
     path = path_of(mechanism, np.array(move))
@@ -154,7 +154,7 @@ def test_memory_of_a_plan_grows_with_the_number_of_bodies():
 
 
 def test_a_joint_of_many_bodies_by_its_own_coordinates():
-    mechanism = bent_chain(160)
+    mechanism = geared_chain(160)
     system = build_system(mechanism)
     random = np.random.default_rng(2)
     q, v = random.standard_normal((2, 3, system.n))
@@ -168,7 +168,7 @@ def test_a_joint_of_many_bodies_by_its_own_coordinates():
 
 
 def test_effort_of_many_springs(monkeypatch):
-    mechanism = bent_chain(140)
+    mechanism = geared_chain(140)
     motion = follow_path(mechanism, path_of(mechanism, np.array([-0.002, 0.001])), np.linspace(0.0, 0.02, 3))
     found = required_effort(motion)
     monkeypatch.setattr("paraflex.dynamics.joint_coordinates.DENSE_ROWS", 10**9)

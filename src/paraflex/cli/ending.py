@@ -4,7 +4,6 @@ import json
 import time
 from collections.abc import Callable, Iterable, Mapping
 from contextlib import nullcontext
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -83,10 +82,9 @@ def write_drawn(results: xr.Dataset | Mapping[str, Any], folder: ResultsFolder, 
 
                 calls.append(lambda: save_page(page_of(results, folder.path), new / "report.html"))
             if drawn.figures:
-                from paraflex.plots.save import ACCOMPANYING, accompanying, write_figures  # as does this one
+                from paraflex.plots.save import figure_calls  # as does this one
 
-                write = partial(write_figures, folder=new / "figures", formats=ACCOMPANYING, dpi=None, force=True)
-                calls += [partial(write, [figure]) for figure in accompanying(results, new / "figures")]
+                calls += figure_calls(results, new / "figures")
             share_out(calls)
     except KeyboardInterrupt as interrupt:
         interrupt.args = (f"the numbers are in {folder.path}; {_LATER}",)

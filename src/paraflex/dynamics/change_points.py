@@ -10,8 +10,8 @@ from paraflex.kernel.packed import Signals
 from paraflex.mechanism.profiles import ConstantSpeed, HeldAngle
 from .following import driven_rows, drives_at
 from .projection import NAMED, second_rates
-from .rank import DENSE_ROWS, Dependence, dependence
-from .system import System
+from .rank import Dependence, dependence
+from .system import DENSE_ROWS, System
 
 # Curvatures and rates below this fraction of the largest are rounding.
 _ROUNDING = 1e-7

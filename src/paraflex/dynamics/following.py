@@ -13,8 +13,7 @@ from paraflex.mechanism import PrescribedAngle
 from .inputs import inputs_of
 from .joint_coordinates import value_text
 from .projection import assemble, closed, constraint_change
-from .rank import DENSE_ROWS
-from .system import System
+from .system import DENSE_ROWS, System
 
 # Weight of stiffness in `link_metric` when loops are closed: links move, their deflections stay as given.
 POSITION_STIFFNESS = 1e6

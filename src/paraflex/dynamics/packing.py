@@ -51,11 +51,12 @@ def pack_system(placed: PlacedBodies, constraints: list[Constraint]) -> tuple[Pa
     loads = _load_records(mechanism, packer)
     markers, columns = packer.markers, _columns(bodies, packer.markers)
     tracks, breaks, coefficients = _tracks([bodies[i] for i in packer.tracks])
+    kinds = [_kinds(body) for body in bodies]
     bent = [marker.bending for marker in markers if marker.bending is not None]
     points = [body.points for body in bodies if body.points is not None]
 
     packed = PackedSystem(
-        bodies=_body_records(bodies, packer.ports, packer.motor_sides, columns),
+        bodies=_body_records(bodies, packer.ports, packer.motor_sides, columns, kinds),
         markers=_marker_records(markers),
         ports=_port_records(packer.ports),
         motor_sides=records(MOTOR_SIDE, [side for group in packer.motor_sides for side in group]),
@@ -81,7 +82,7 @@ def pack_system(placed: PlacedBodies, constraints: list[Constraint]) -> tuple[Pa
         spans=_flat([_padded(p.weights.T) for p in points]),
         weights=_flat([_padded(p.weights, p.mass.size) for p in points]),
         inertias=_flat([_padded(np.stack([p.x, p.mass, p.inertia])) for p in points]),
-        kinds=np.concatenate([rows for body in bodies for rows in _kinds(body)]),
+        kinds=np.concatenate([numbers for each in kinds for numbers in each]),
         total_mass=np.sum([body.integrals.m for body in bodies]).item(),
         size=packer.size,
         gravity=np.array(mechanism.gravity) * 1.0,
@@ -256,10 +257,11 @@ def records(dtype: np.dtype, values: list[dict[str, Any]]) -> Records:
     return np.array(rows, dtype=dtype)
 
 
-def _body_records(bodies, ports, motor_sides, columns) -> Records:
+def _body_records(bodies, ports, motor_sides, columns, kinds) -> Records:
     values: list[dict] = []
     start: Counter[str] = Counter()
-    for body, body_ports, body_motors, matrix in zip(bodies, ports, motor_sides, columns, strict=True):
+    parts_of = zip(bodies, ports, motor_sides, columns, kinds, strict=True)
+    for body, body_ports, body_motors, matrix, (along, across) in parts_of:
         s, nf, size, full = body.integrals, body.nf, 3 + body.nf, _is_full(body)
         # Mass points, and the Gauss points whose slopes shorten them.
         points, slopes = (0, 0) if body.points is None else body.points.weights.shape
@@ -277,14 +279,13 @@ def _body_records(bodies, ports, motor_sides, columns) -> Records:
             "places": 3 * nf * pitch,
             "spans": slopes * pitch,
             "weights": points * pitch,
+            "along": along.size + across.size,
             "inertias": 3 * pitch,
             "dense": size * padded(size) if full else 0,
             "port": len(body_ports),
             "motor": len(body_motors),
             "columns": matrix.size,
         }
-        along, across = _kinds(body)
-        own["along"] = along.size + across.size
         starts = {name: start[name] for name in own}
         start.update(own)
         numbers = {

@@ -14,9 +14,9 @@ from paraflex.errors import InconsistentConstraintsError, Moment
 from paraflex.kernel.packed import INDEX_1, Signals
 from paraflex.kernel.stage import equations
 from .inputs import inputs_of
-from .rank import DENSE_ROWS, Dependence, constraint_jacobian, dependence, involved, joint_of_row
+from .rank import Dependence, constraint_jacobian, dependence, involved, joint_of_row
 from .sparse import Saddle, elastic_stiffness, sparse_mass
-from .system import System
+from .system import DENSE_ROWS, System
 
 Sparse = scipy.sparse.csr_matrix
 # Function from the wanted rows (m,) to the smallest change.

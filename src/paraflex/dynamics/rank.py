@@ -8,7 +8,7 @@ import scipy
 from paraflex.arrays import Array, Indices
 from paraflex.kernel.linear import factor_system
 from .sparse import body_masses, sparse_jacobian
-from .system import DENSE_ROWS as DENSE_ROWS, System
+from .system import DENSE_ROWS, System
 
 # A constraint row with an independent part smaller than this fraction of the largest is redundant.
 DEPENDENT = 1e-9

@@ -12,7 +12,7 @@ from paraflex.arguments import checked_arguments
 from paraflex.arrays import Array
 from paraflex.dynamics import State, System, dependence
 from paraflex.dynamics.change_points import dependent_drives
-from paraflex.dynamics.rank import DENSE_ROWS
+from paraflex.dynamics.system import DENSE_ROWS
 from paraflex.errors import ConstraintDriftError, IntegrationError, Moment, SingularPositionError, SliderOffBeamError
 from paraflex.findings import Finding
 from paraflex.kernel.packed import Signals

@@ -16,7 +16,7 @@ import scipy
 from paraflex.arrays import Array
 from paraflex.dynamics import dependence, moment_signals
 from paraflex.dynamics.projection import assemble, closed, constraint_change, link_metric, project
-from paraflex.dynamics.rank import DENSE_ROWS
+from paraflex.dynamics.system import DENSE_ROWS
 from paraflex.kernel import indices as at
 from paraflex.kernel.linear import factor_system
 from paraflex.kernel.packed import Workspace

@@ -17,7 +17,7 @@ from .vectors import LANES, add_product, add_scaled, load, padded, store, summed
 def place_sums(system, i, q, v, a, points):
     """Compute Nx u, Ny u and the slopes of all mass points of body i, and the same for u' and u''.
 
-    Into points.bent go the terms of the shortening at Gauss points, and of its derivatives.
+    Into points.shortening go the terms of the shortening at Gauss points, and of its derivatives.
     """
     body = system.bodies[i]
     pitch = body.pitch
@@ -27,10 +27,10 @@ def place_sums(system, i, q, v, a, points):
         slope = 2 * pitch + block
         s0, s1 = load(points.q, slope), load(points.v, slope)
         minus = add_scaled(zeros(), s0, -1.0)
-        store(points.bent, block, add_product(zeros(), add_scaled(zeros(), minus, 0.5), s0))
-        store(points.bent, pitch + block, add_product(zeros(), minus, s1))
+        store(points.shortening, block, add_product(zeros(), add_scaled(zeros(), minus, 0.5), s0))
+        store(points.shortening, pitch + block, add_product(zeros(), minus, s1))
         squares = add_product(zeros(), add_scaled(zeros(), s1, -1.0), s1)
-        store(points.bent, slope, add_product(squares, minus, load(points.a, slope)))
+        store(points.shortening, slope, add_product(squares, minus, load(points.a, slope)))
 
 
 @inlined
@@ -117,9 +117,9 @@ def shortened(system, i, block, points):
     vx, bx, at = load(points.v, block), load(points.a, block), body.spans + block
     for j in range(body.slopes):
         weight = load(system.spans, at)
-        sx = add_scaled(sx, weight, points.bent[j])
-        vx = add_scaled(vx, weight, points.bent[pitch + j])
-        bx = add_scaled(bx, weight, points.bent[2 * pitch + j])
+        sx = add_scaled(sx, weight, points.shortening[j])
+        vx = add_scaled(vx, weight, points.shortening[pitch + j])
+        bx = add_scaled(bx, weight, points.shortening[2 * pitch + j])
         at += pitch
     return sx, vx, bx
 

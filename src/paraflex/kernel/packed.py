@@ -204,7 +204,7 @@ class PointScratch(NamedTuple):
     a: Annotated[Floats, "sums"]
     shares: Annotated[Floats, "sums"]  # force on each
     axial: Annotated[Floats, "pitch"]  # axial forces at the Gauss points
-    bent: Annotated[Floats, "sums"]  # -w^2/2 for the slopes w at the Gauss points, and its two derivatives
+    shortening: Annotated[Floats, "sums"]  # -w^2/2 for the slopes w at the Gauss points, and its two derivatives
     rows: Annotated[Floats, "tangents"]  # ds/du: x and y of all points by coordinate
     B_q: Annotated[Floats, "stride"]  # a marker's bending matrix times u
     B_v: Annotated[Floats, "stride"]

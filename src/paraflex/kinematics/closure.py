@@ -19,7 +19,7 @@ from paraflex.dynamics import (
     still_signals,
 )
 from paraflex.dynamics.points import point_motion
-from paraflex.dynamics.rank import DENSE_ROWS
+from paraflex.dynamics.system import DENSE_ROWS
 from paraflex.errors import AssemblyError, InputError, Moment, NumericalError, UnreachablePathError
 from paraflex.kernel.arrays import apart
 from paraflex.kernel.closure import LOOPS_CLOSED, LOOPS_SINGULAR, close_path, make_closure_scratch, task_values

@@ -11,8 +11,8 @@ from paraflex.arrays import Array, Indices, Mask
 from paraflex.dynamics import System, material_angle
 from paraflex.dynamics.points import marker_place
 from paraflex.dynamics.projection import LeastChange, assemble, closed, shortened
-from paraflex.dynamics.rank import DENSE_ROWS
 from paraflex.dynamics.sparse import Saddle, sparse_jacobian
+from paraflex.dynamics.system import DENSE_ROWS
 from paraflex.kernel.packed import Signals
 from paraflex.mechanism import PointRef
 
@@ -103,10 +103,6 @@ class Shortfall:
         order = np.argsort(np.concatenate([self.t, more.t]), kind="stable")
         names = ("t", "desired", "distance", "turn", "own")
         return Shortfall(*(np.concatenate([getattr(self, name), getattr(more, name)])[order] for name in names))
-
-
-def _nearest(rows: scipy.sparse.csr_matrix) -> Saddle:
-    return Saddle(scipy.sparse.csr_matrix(scipy.sparse.identity(rows.shape[1])), rows)
 
 
 @dataclass(frozen=True)
@@ -271,3 +267,8 @@ class PoseSearch:
             move[0] = longest
         step = free @ (vectors @ move)
         return step * shortened(step, longest)
+
+
+def _nearest(rows: scipy.sparse.csr_matrix) -> Saddle:
+    """Return the equations of the smallest change with given values of rows."""
+    return Saddle(scipy.sparse.csr_matrix(scipy.sparse.identity(rows.shape[1])), rows)

@@ -1,6 +1,6 @@
 """Writing of figures: those that accompany the results of a command, and single figures for print."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -19,8 +19,6 @@ from .layout import column_width
 from .planned import PlannedFigure, drawings, figures_of
 from .sources import Source, kind_of_numbers
 from .style import FIGURE_FORMATS, write_figure
-
-ACCOMPANYING = ("png", "svg")
 
 
 @checked_arguments()
@@ -54,10 +52,21 @@ def save_figures(results: xr.Dataset | Mapping[str, Any], folder: str | Path, mo
     OutputError
         The folder cannot be written.
     """
-    return write_figures(accompanying(results, Path(folder), mode), Path(folder), ACCOMPANYING, dpi=None, force=True)
+    return _write_beside(_accompanying(results, Path(folder), mode), Path(folder))
 
 
-def accompanying(results: xr.Dataset | Mapping[str, Any], folder: Path, mode: str | None = None) -> list[PlannedFigure]:
+def figure_calls(results: xr.Dataset | Mapping[str, Any], folder: Path) -> list[Callable[[], object]]:
+    """Return a call for each figure of `save_figures`, which writes it."""
+    return [partial(_write_beside, [figure], folder) for figure in _accompanying(results, folder)]
+
+
+def _write_beside(drawn: Sequence[PlannedFigure], folder: Path) -> list[Path]:
+    return write_figures(drawn, folder, ("png", "svg"), dpi=None, force=True)
+
+
+def _accompanying(
+    results: xr.Dataset | Mapping[str, Any], folder: Path, mode: str | None = None
+) -> list[PlannedFigure]:
     """Return the figures that `save_figures` writes."""
     kind = kind_of(results) if isinstance(results, xr.Dataset) else kind_of_numbers(results)
     if not kind:
@@ -118,13 +127,14 @@ def write_figures(
             remedy="add --force to write over it, or name another --output",
         )
     with added_to(folder) as new:
-        share_out([partial(_write, drawing, new, formats, style, dpi) for drawing in drawn])
+        share_out([partial(_write, drawing, [new / file.name for file in files[drawing.stem]], style, dpi)
+                   for drawing in drawn])  # fmt: skip
     return [file for drawing in drawn for file in files[drawing.stem]]
 
 
-def _write(drawing: PlannedFigure, folder: Path, formats: Sequence[str], style: str | None, dpi: float | None) -> None:
+def _write(drawing: PlannedFigure, files: Sequence[Path], style: str | None, dpi: float | None) -> None:
     with column_width(style):
         figure = drawing.draw()
-    for name in formats:
-        with whole_file(folder / f"{portable_name(drawing.stem)}.{name}", field=str(folder)) as unfinished:
-            write_figure(figure, unfinished, name, dpi)
+    for file in files:
+        with whole_file(file, field=str(file.parent)) as unfinished:
+            write_figure(figure, unfinished, file.suffix[1:], dpi)
