@@ -15,11 +15,10 @@ import numpy as np
 
 from paraflex.arrays import Array
 from paraflex.kernel.bodies import motion_forces
-from paraflex.kernel.packed import INDEX_1, make_scratch
-from paraflex.kernel.stage import equations
+from paraflex.kernel.constraints import add_reactions
+from paraflex.kernel.packed import make_scratch
 from .inputs import inputs_of
 from .joint_coordinates import joint_coordinate
-from .signals import moment_signals
 from .state import carried
 from .system import System, build_system
 
@@ -47,38 +46,35 @@ class Completion:
         They are NaN at instants at which other forces than those of motors and loads act.
         """
         q_all, v_all, a_all = (carried(self.whole, self._few, part) for part in (q, v, a))
-        forces, ways = _forces(self._few, q, v, a, multipliers)
-        others, other_ways = _forces(self.whole, q_all, v_all, a_all, multipliers)
-        acting = -np.einsum("kan,kn->ka", np.linalg.pinv(ways.swapaxes(1, 2)), forces)
-        left = forces + np.einsum("kan,ka->kn", ways, acting)
-        bodies = np.zeros_like(q)
-        motion_forces(
-            packed := self._few.packed, q, v, a, np.zeros((len(q), ways.shape[1])), bodies, make_scratch(packed)
-        )
-        balanced = np.max(np.abs(left), axis=1) <= _BALANCED * np.max(np.abs(bodies))
-        left = others + np.einsum("kan,ka->kn", other_ways, acting)
+        bodies, forces, ways = self._forces(q_all, v_all, a_all, multipliers)
+        # By virtual work these are the forces on the coordinates kept.
+        kept = carried(self.whole, self._few, np.eye(self._few.n)).T
+        acting = -(forces @ kept)[:, None] @ np.linalg.pinv(ways @ kept)
+        forces += (acting @ ways)[:, 0]
+        balanced = np.max(np.abs(forces @ kept), axis=1) <= _BALANCED * np.max(np.abs(bodies @ kept))
         for body in self.whole.bodies:
             if body.name in self._few.mechanism.bases:
-                q_all[:, body.flexible] -= left[:, body.flexible] / body.modes.omega**2
+                q_all[:, body.flexible] -= forces[:, body.flexible] / body.modes.omega**2
         q_all[~balanced] = np.nan
         return q_all, v_all, a_all
 
+    def _forces(self, q: Array, v: Array, a: Array, multipliers: Array) -> tuple[Array, Array, Array]:
+        """Return the forces (k, n) of the bodies' motion and of that with joints, and those of unit inputs."""
+        packed, mechanism = self.whole.packed, self.whole.mechanism
+        inputs, scratch = inputs_of(mechanism), make_scratch(packed)
 
-def _forces(system: System, q: Array, v: Array, a: Array, multipliers: Array) -> tuple[Array, Array]:
-    """Return the forces (k, n) of a motion without motors, and those (k, acting, n) that unit inputs add to them."""
-    inputs, signals, workspace = inputs_of(system.mechanism), moment_signals(system.mechanism, 0.0), system.workspace()
-    torques, found = np.zeros(inputs.acting), np.zeros_like(q)
-    for k in range(len(q)):
-        equations(system.packed, signals, 0.0, INDEX_1, q[k], v[k], a[k], multipliers[k], torques, workspace)
-        found[k] = workspace.f
-    ways = np.zeros((len(q), inputs.acting, system.n))
-    for k, motor in zip(inputs.motors, system.mechanism.motors, strict=True):
-        ways[:, k] = -joint_coordinate(system, motor.joint, q).rows
-    for k in inputs.loads:
-        pair = np.zeros((2, *q.shape))
-        for of_one, value in zip(pair, (0.0, 1.0), strict=True):
-            acting = np.zeros((len(q), inputs.acting))
-            acting[:, k] = value
-            motion_forces(system.packed, q, v, a, acting, of_one, make_scratch(system.packed))
-        ways[:, k] = pair[1] - pair[0]
-    return found, ways
+        def under(acting: Array) -> Array:
+            motion_forces(packed, q, v, a, acting, found := np.zeros_like(q), scratch)
+            return found
+
+        still = np.zeros((len(q), inputs.acting))
+        bodies = under(still)
+        add_reactions(packed, q, multipliers, still[0], forces := bodies.copy(), np.zeros(self.whole.m), scratch)
+        ways = np.zeros((len(q), inputs.acting, self.whole.n))
+        for k, motor in zip(inputs.motors, mechanism.motors, strict=True):
+            ways[:, k] = -joint_coordinate(self.whole, motor.joint, q).rows
+        for k in inputs.loads:
+            unit = still.copy()
+            unit[:, k] = 1.0
+            ways[:, k] = under(unit) - bodies
+        return bodies, forces, ways

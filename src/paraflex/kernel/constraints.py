@@ -4,9 +4,9 @@ from math import cosh
 
 from . import joints
 from .arrays import fill
-from .axes import axis_motion, axis_values, fill_axis_rows
+from .axes import apply_axes, axis_motion, axis_values, fill_axis_rows
 from .compiling import inlined, kernel, routine, unoptimised
-from .packed import ANGLE, AXIS, CONSTRAINT, DAMPER, FRICTION
+from .packed import ANGLE, AXIS, CONSTRAINT, DAMPER, FRICTION, INDEX_1
 from .signals import evaluate_signal
 from .sums import body_sums
 
@@ -65,6 +65,18 @@ def fill_jacobian(system, q, jacobian):
             joints.apply_force(system, marker, q, port.weight, 0.0, rx, ry, jacobian[port.row])
             joints.apply_force(system, marker, q, 0.0, port.weight, rx, ry, jacobian[port.row + 1])
     fill_axis_rows(system, q, jacobian)
+
+
+@kernel
+def add_reactions(system, q, lam, torques, f, rows, scratch):
+    """Add Phi_q^T lambda to f at every sample of a motion.
+
+    q, lam, f : (instants, n), (instants, m) and (instants, n) arrays; torques : (acting,) zeros; rows : (m,) scratch.
+    """
+    for k in range(q.shape[0]):
+        for i in range(system.bodies.size):
+            joints.body_joints(system, i, q[k], q[k], q[k], lam[k], INDEX_1, scratch, f[k], rows)
+        apply_axes(system, q[k], q[k], q[k], lam[k], INDEX_1, torques, f[k], rows)
 
 
 @inlined
