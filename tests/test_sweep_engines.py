@@ -8,7 +8,7 @@ import sys
 import time
 import urllib.error
 import urllib.request
-from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
+from concurrent.futures import Future, ProcessPoolExecutor, ThreadPoolExecutor
 from contextlib import contextmanager
 from multiprocessing import get_context
 
@@ -18,6 +18,7 @@ import pytest
 
 from journals import rows_in
 from paraflex.campaign import LostCluster, Workers, open_engine, outcomes
+from paraflex.campaign.workers import Engine, LostWorker
 from paraflex.designs.run import Outcome, run_task
 from paraflex.errors import InputError, ResultWarning
 from paraflex.studies import load_sweep, sweep
@@ -309,3 +310,57 @@ def test_trajectories_of_shards_are_joined(tmp_path):
     found = {each.name: each.read_bytes() for each in (tmp_path / "out" / "trajectories").iterdir()}
     assert len(found) == joined.total
     assert kept.items() <= found.items()
+
+
+class KilledWorker(Exception):
+    """What Dask raises for a call whose workers died."""
+
+
+class Short(Engine):
+    """Makes each call at once; those with an unlucky task among several others find their worker dead."""
+
+    most = 16
+
+    def __init__(self, unlucky):
+        super().__init__(2)
+        self.unlucky, self.calls = unlucky, []
+
+    def submit(self, function, *arguments):
+        self.calls.append(tuple(arguments[1]))
+        future = Future()
+        if self.unlucky in self.calls[-1]:
+            future.set_exception(KilledWorker("it died"))
+        else:
+            future.set_result(function(*arguments))
+        return future
+
+
+def square(task):
+    return task * task
+
+
+def test_short_tasks_are_submitted_together():
+    engine = Short(unlucky=None)
+    assert dict(outcomes(engine, square, range(300))) == {k: k * k for k in range(300)}
+    sizes = [len(call) for call in engine.calls]
+    assert sizes[:4] == [1] * 4
+    assert max(sizes) == engine.most
+    assert sum(sizes) == 300
+
+
+def test_only_the_task_that_kills_workers_is_lost_of_those_submitted_together():
+    engine = Short(unlucky=200)
+    found = dict(outcomes(engine, square, range(300)))
+    assert isinstance(found.pop(200), LostWorker)
+    assert found == {k: k * k for k in range(300) if k != 200}
+    assert max(len(call) for call in engine.calls if 200 in call) > 1
+
+
+def test_long_tasks_are_submitted_one_by_one():
+    engine = Short(unlucky=None)
+    dict(outcomes(engine, sleep_long, range(6)))
+    assert [len(call) for call in engine.calls] == [1] * 6
+
+
+def sleep_long(task):
+    time.sleep(0.3)

@@ -14,7 +14,7 @@ from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import BrokenExecutor, CancelledError, Executor, Future, ProcessPoolExecutor, ThreadPoolExecutor
 from contextlib import suppress
 from importlib import import_module
-from itertools import islice
+from itertools import chain, islice
 from queue import Empty, SimpleQueue
 from typing import Any, TypeVar
 
@@ -27,6 +27,8 @@ DASK = "dask"
 WORKER_ENGINES = (THREADS, PROCESSES, DASK)
 # Tasks submitted per worker, one running and one waiting, so that memory does not grow with the number of tasks.
 _AHEAD = 2
+# Duration of the calls in which short tasks are submitted together, where a call is costly [s].
+_BUNDLE = 0.5
 # Number of workers that a task, run alone, may kill before it is given up.
 _DEATHS = 2
 # Time limit for the answer of a scheduler, and interval between two counts of a cluster's workers [s].
@@ -81,8 +83,14 @@ class Engine:
     """Executor of function calls, which returns futures; base class for pools of this machine and for clusters.
 
     As a context manager it is closed at the end. After an error or Ctrl-C, the workers do not finish their tasks.
+
+    Attributes
+    ----------
+    most : int
+        Largest number of tasks in a call.
     """
 
+    most = 1
     _pool: Any
 
     def __init__(self, workers: int) -> None:
@@ -176,6 +184,8 @@ class Processes(Engine):
 
 class Dask(Engine):
     """Workers of a Dask cluster, which reassigns the tasks of a worker that died."""
+
+    most = 256
 
     def __init__(self, workers: int, address: str | None) -> None:
         super().__init__(1)
@@ -337,33 +347,45 @@ def outcomes(engine: Engine, function: Callable[..., R], tasks: Iterable[T]) -> 
     task, result
         Task and its result, which is a LostWorker if every worker that ran the task died.
     """
-    waiting, running, calls = iter(tasks), {}, Calls()
+    waiting, calls, size = iter(tasks), Calls(), 1
+    running: dict[Future[Any], tuple[T, ...]] = {}
     while True:
-        more = islice(waiting, max(0, _AHEAD * engine.workers - len(running)))
-        running |= {calls.submit(_submit, engine, function, task): task for task in more}
+        while len(running) < _AHEAD * engine.workers and (bundle := tuple(islice(waiting, size))):
+            running[calls.submit(_submit, engine, _each, function, bundle)] = bundle
         if not running:
             return
         done = calls.done()
-        suspects = []
+        suspects: list[T] = []
         # Futures are processed in the order of submission, which the set `done` does not keep.
         for future in [each for each in running if each in done]:
-            task = running.pop(future)
+            bundle = running.pop(future)
             try:
-                result = future.result()
+                seconds, results = future.result()
             except (BrokenExecutor, CancelledError):
-                suspects.append(task)
+                suspects += bundle
                 continue
             except Exception as error:
-                # Dask gives up a task after several of its workers have died.
+                # Dask gives up a call after several of its workers have died.
                 if type(error).__name__ != "KilledWorker":
                     raise
-                result = LostWorker(f"every worker that took it died: {error}")
-            yield task, result
+                if len(bundle) > 1:
+                    yield from outcomes(engine, function, bundle)
+                    continue
+                seconds, results = math.inf, [LostWorker(f"every worker that took it died: {error}")]
+            yield from zip(bundle, results, strict=True)
+            size = max(1, min(2 * len(bundle), engine.most, int(_BUNDLE * len(bundle) / seconds)))
         if suspects:
-            suspects += running.values()
+            suspects += chain.from_iterable(running.values())
             running = {}
             engine.restart()
             yield from _one_by_one(engine, function, suspects)
+
+
+def _each(function: Callable[..., R], tasks: Iterable[T], *more: object) -> tuple[float, list[R]]:
+    """Return the time that a function takes for several tasks [s], and its results."""
+    began = time.perf_counter()
+    results = [function(task, *more) for task in tasks]
+    return max(time.perf_counter() - began, 1e-9), results
 
 
 def share_out(calls: Sequence[Callable[[], object]]) -> None:
@@ -422,9 +444,9 @@ def _apart(start: Callable[[], T]) -> T:
     return started.result()
 
 
-def _submit(engine: Engine, function: Callable[..., Any], task: object) -> Future[Any]:
+def _submit(engine: Engine, function: Callable[..., Any], *arguments: object) -> Future[Any]:
     try:
-        return engine.submit(function, task)
+        return engine.submit(function, *arguments)
     except BrokenExecutor as error:
         broken: Future[Any] = Future()
         broken.set_exception(error)

@@ -141,13 +141,15 @@ class NativeMethod(Method):
 
     Attributes
     ----------
-    newton_fraction : float
-        Default part of the error allowed in a step that Newton's iteration may leave. An error estimate of high order
-        contains the residual of Newton's iteration in the stages: a smaller part then gives far fewer steps.
+    newton_fraction, fixed_newton_fraction : float
+        Default part of the error allowed in a step that Newton's iteration may leave, if the error is controlled and in
+        fixed steps. An error estimate of high order contains the residual of Newton's iteration in the stages: with a
+        large part there are more steps.
     """
 
     fixed_step = True
     newton_fraction: ClassVar[float] = 0.03
+    fixed_newton_fraction: ClassVar[float] = 0.03
 
     @property
     @abstractmethod

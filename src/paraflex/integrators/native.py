@@ -278,7 +278,8 @@ def prepare(problem: Problem, options: IntegrationOptions) -> NativeRun:
         force_control=int(options.control_for(system) is Control.FORCES),
         force_cycles=_FORCE_CYCLES if system.vibrations_die_out else np.inf,
         long_from=_FOLLOWS / slowest_deflection(system, initial.q),
-        newton_fraction=options.newton_fraction or method.newton_fraction,
+        newton_fraction=options.newton_fraction
+        or (method.fixed_newton_fraction if options.step else method.newton_fraction),
         alpha=options.alpha,
         beta=options.beta,
         gain=_BAUMGARTE_GAIN if options.automatic_gains else 0.0,

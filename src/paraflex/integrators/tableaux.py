@@ -115,6 +115,7 @@ class TRBDF2(ESDIRK):
     title = "TR-BDF2"
     order = 2
     source = "Hosea and Shampine (1996), Appl. Numer. Math. 20, 21-37"
+    newton_fraction: ClassVar[float] = 0.5
 
     tableau: ClassVar[Tableau] = make_tableau(
         [[0.0], [_D2, _D2], [_W2, _W2, _D2]],
@@ -132,7 +133,8 @@ class ESDIRK3(ESDIRK):
     title = "ESDIRK 3(2)"
     order = 3
     source = "Kennedy and Carpenter (2003), Appl. Numer. Math. 44, 139-181"
-    newton_fraction: ClassVar[float] = 1e-3
+    newton_fraction: ClassVar[float] = 1e-2
+    fixed_newton_fraction: ClassVar[float] = 1e-3
 
     tableau: ClassVar[Tableau] = make_tableau(
         [
@@ -157,7 +159,8 @@ class ESDIRK4(ESDIRK):
     title = "ESDIRK 4(3)"
     order = 4
     source = "Kennedy and Carpenter (2019), Appl. Numer. Math. 146, 221-244"
-    newton_fraction: ClassVar[float] = 1e-3
+    newton_fraction: ClassVar[float] = 1e-2
+    fixed_newton_fraction: ClassVar[float] = 1e-3
 
     tableau: ClassVar[Tableau] = make_tableau(
         paired_rows("1/4", [
@@ -182,7 +185,8 @@ class ESDIRK5(ESDIRK):
     title = "ESDIRK 5(4)"
     order = 5
     source = "Kennedy and Carpenter (2019), Appl. Numer. Math. 146, 221-244"
-    newton_fraction: ClassVar[float] = 1e-3
+    newton_fraction: ClassVar[float] = 1e-2
+    fixed_newton_fraction: ClassVar[float] = 1e-3
 
     tableau: ClassVar[Tableau] = make_tableau(
         paired_rows("23/125", [
