@@ -1,18 +1,21 @@
 """What does a run cost, and a million? Measures, fits and extrapolates; writes the tables of docs/cost-model.md.
 
-    python benchmarks/cost_model.py [--quick] [--write]
+    python benchmarks/cost_model.py [--quick] [--designs 5000] [--write]
 
 Measured are the time of a Newton iteration over bodies, loops and modes, and the number of iterations over tolerance
 and duration; each is fitted by a formula whose worst misfit is stated. A study of a million runs of RAParM-I is
-extrapolated from a run and its planning, and from how much slower a run gets while all processors of this machine do
-the same. With --write the part of docs/cost-model.md between its two marks is replaced. Takes some minutes.
+extrapolated from some designs of a sweep, and from how much slower they get while all processors of this machine do the
+same; a sweep of some thousand is predicted in the same way, and measured. With --write the part of docs/cost-model.md
+between its two marks is replaced. Takes twenty minutes.
 """
 
 from __future__ import annotations
 
+import math
 import multiprocessing
 import os
 import statistics
+import tempfile
 import time
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
@@ -26,10 +29,13 @@ from numpy.typing import NDArray
 from scaling import MOVING, fastest
 
 import paraflex as pf
+from paraflex.campaign import Workers
 from paraflex.compilation import compile_kernels
+from paraflex.designs.run import Task, run_task
 from paraflex.dynamics import build_system, start_state
 from paraflex.integrators import IntegrationOptions, Solution
 from paraflex.mechanism import Geometry, Start, chain_of_segments, four_bars_in_a_row, loops
+from paraflex.studies import SweepStudy, load_sweep, sweep
 from paraflex.tracking import TrackingTask
 
 MODE, METHOD, TOLERANCE = "++++", "tr-bdf2", 1e-4
@@ -38,6 +44,22 @@ ROWS, CHAINS, MODES = (2, 5, 10, 20, 50, 100), (5, 10, 20, 50, 100, 200), (1, 2,
 TOLERANCES, DURATIONS = (1e-3, 3e-4, 1e-4, 3e-5, 1e-5), (0.2, 0.35, 0.7, 1.4)
 STUDY, CORES = 1_000_000, (1, 128, 1024, 10_240)
 REPEATS = 3
+DESIGNS = """
+mechanism = "raparm_i"
+set = {{geometry = "{geometry}"}}
+paths = ["square"]
+modes = ["{mode}"]
+[sampling]
+kind = "sobol"
+number = {designs}
+[integration]
+method = "{method}"
+tolerance = {tolerance}
+[vary.thickness]
+fields = ["section.bar.thickness"]
+low = 0.0050
+high = 0.0051
+"""
 
 
 @dataclass(frozen=True)
@@ -149,28 +171,30 @@ def _work(task: TrackingTask, method: str, tolerance: float) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _plan_and_run(geometry: str) -> tuple[float, float]:
-    """Seconds of planning, system and torques, and of the run: what a design of its own costs."""
-    began = time.perf_counter()
-    task = plan()
-    task = task.remodelled(task.mechanism.with_geometry(Geometry(geometry)))
-    task.torques(MODE)
-    planned = time.perf_counter() - began
-    options = IntegrationOptions(method=METHOD, tolerance=TOLERANCE)
-    return planned, task.simulate(MODE, options=options).solution.wall_time
+def _sweep(geometry: str, designs: int) -> SweepStudy:
+    """Designs of RAParM-I that differ in the thickness of the links, each planned and run in one mode."""
+    with tempfile.TemporaryDirectory() as name:
+        file = Path(name) / "study.toml"
+        file.write_text(
+            DESIGNS.format(geometry=geometry, mode=MODE, designs=designs, method=METHOD, tolerance=TOLERANCE),
+            encoding="utf-8",
+        )
+        return load_sweep(file)
 
 
 def _many(geometry: str, count: int) -> float:
-    """Seconds each, of so many designs one after the other."""
-    _plan_and_run(geometry)
+    """Seconds each, of so many designs of a sweep one after the other."""
+    study = _sweep(geometry, count + 1)
+    tasks = [Task(k, k, tuple(row.tolist()), "square") for k, row in enumerate(study.designs)]
+    run_task(study.setting, tasks[0])
     began = time.perf_counter()
-    for _ in range(count):
-        _plan_and_run(geometry)
+    for task in tasks[1:]:
+        run_task(study.setting, task)
     return (time.perf_counter() - began) / count
 
 
-def study(count: int) -> list[dict[str, Any]]:
-    """What a design costs alone, and while every processor of this machine computes one."""
+def study(count: int, designs: int) -> list[dict[str, Any]]:
+    """What a design costs alone, and while every processor of this machine computes one; and a sweep of many."""
     processors = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
     out = []
     context = multiprocessing.get_context("spawn")
@@ -181,14 +205,22 @@ def study(count: int) -> list[dict[str, Any]]:
                 statistics.mean(pool.starmap(_many, [(geometry.value, count)] * processors, chunksize=1))
                 for _ in range(REPEATS)
             )
-        planned, run = min(_plan_and_run(geometry.value) for _ in range(REPEATS + 1))
         out.append(
             {
-                "geometry": geometry.value, "planning": planned, "run": run, "alone": alone, "together": together,
-                "processors": processors, "efficiency": alone / together,
+                "geometry": geometry.value, "alone": alone, "together": together, "processors": processors,
+                "efficiency": alone / together, "designs": designs, "predicted": together * designs / processors,
+                "swept": _swept(geometry.value, designs, processors) if designs else math.nan,
             }
         )  # fmt: skip
     return out
+
+
+def _swept(geometry: str, designs: int, processors: int) -> float:
+    """Seconds of a sweep in processes, of their start to the last row of the table."""
+    with tempfile.TemporaryDirectory() as name:
+        began = time.perf_counter()
+        sweep(_sweep(geometry, designs), Path(name) / "out", workers=Workers("processes", processors))
+        return time.perf_counter() - began
 
 
 def hours(design: dict[str, Any], cores: int, runs: int = STUDY) -> float:
@@ -244,6 +276,8 @@ def tables(found: dict[str, Any], fitted: dict[str, Fit], here: dict[str, Any]) 
     rows = [[name, fit.formula, f"{fit.misfit:.0%}"] for name, fit in fitted.items()]
     parts += ["### How it grows", markdown(["over", "formula", "worst misfit"], rows)]
     parts += ["### A million designs", _study_table(found["study"])]
+    if found["study"][0]["designs"]:
+        parts += ["### A sweep, predicted and measured", _swept_table(found["study"])]
     rows = [
         [row["mechanism"], str(row["bodies"]), str(row["loops"]), f"{row['microseconds']:.1f}"]
         for row in found["bodies"]
@@ -279,17 +313,26 @@ def _shares(values: dict[str, Any]) -> str:
 
 def _study_table(designs: Sequence[dict[str, Any]]) -> str:
     rows = [
-        [row["geometry"], *(f"{row[key]:.3f}" for key in ("planning", "run", "alone", "together")),
+        [row["geometry"], *(f"{row[key]:.3f}" for key in ("alone", "together")),
          *(f"{hours(row, cores):.3g}" for cores in CORES)]
         for row in designs
     ]  # fmt: skip
     busy = f"while {designs[0]['processors']} compute one [s]"
     cores = [f"on {count:,} core{'s' if count > 1 else ''} [h]" for count in CORES]
-    return markdown(["geometry", "planning [s]", "run [s]", "design alone [s]", busy, *cores], rows)
+    return markdown(["geometry", "design alone [s]", busy, *cores], rows)
 
 
-def measure(*, quick: bool) -> dict[str, Any]:
-    """Everything; quickly with fewer and smaller cases."""
+def _swept_table(designs: Sequence[dict[str, Any]]) -> str:
+    rows = [
+        [row["geometry"], f"{row['designs']:,}", f"{row['predicted']:.0f}", f"{row['swept']:.0f}",
+         f"{row['predicted'] / row['swept'] - 1.0:+.0%}"]
+        for row in designs
+    ]  # fmt: skip
+    return markdown(["geometry", "designs", "predicted [s]", "measured [s]", "difference"], rows)
+
+
+def measure(designs: int, *, quick: bool) -> dict[str, Any]:
+    """Everything, with a sweep of so many designs; quickly with fewer and smaller cases."""
     task = plan()
     found: dict[str, Any] = {
         "bodies": over_bodies(ROWS[:4] if quick else ROWS, CHAINS[:4] if quick else CHAINS),
@@ -300,18 +343,19 @@ def measure(*, quick: bool) -> dict[str, Any]:
     }
     for geometry in Geometry:
         found["parts"][geometry.value] = iteration.report(geometry, iteration.TOLERANCE, REPEATS)
-    found["study"] = study(2 if quick else 5)
+    found["study"] = study(2 if quick else 10, designs)
     return found
 
 
 def main() -> None:
     parser = command_line(__doc__)
     parser.add_argument("--quick", action="store_true", help="fewer and smaller cases")
+    parser.add_argument("--designs", type=int, default=5000, help="of the sweep of each geometry; 0 for none")
     given = parser.parse_args()
     single_thread()
     for geometry in Geometry:
         compile_kernels(geometry)
-    found = measure(quick=given.quick)
+    found = measure(given.designs, quick=given.quick)
     fitted = fits(found)
     text = tables(found, fitted, conditions())
     print(text)

@@ -5,6 +5,7 @@ import os
 import shutil
 import signal
 import sys
+import threading
 import time
 import urllib.error
 import urllib.request
@@ -364,3 +365,15 @@ def test_long_tasks_are_submitted_one_by_one():
 
 def sleep_long(task):
     time.sleep(0.3)
+
+
+def test_workers_that_dask_has_given_up_are_started_again():
+    """As after a death while it started, of which Dask keeps neither the worker nor its supervisor."""
+    with open_engine("dask", 1) as engine:
+        cluster = engine._cluster
+        cluster.sync(cluster.workers.pop(0).close)
+        found = {}
+        computing = threading.Thread(target=lambda: found.update(outcomes(engine, abs, [-3])), daemon=True)
+        computing.start()
+        computing.join(60.0)
+        assert found == {-3: 3}

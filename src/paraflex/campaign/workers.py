@@ -192,7 +192,7 @@ class Dask(Engine):
         remedy = "pip install 'paraflex[cluster]'"
         with optional_package("Dask is not installed", field="--engine", value=DASK, remedy=remedy):
             distributed: Any = import_module("distributed")
-        self._cluster = None
+        self._cluster, self._started = None, workers
         if address is None:
             # Only this process has the TLS keys, and no dashboard port is open.
             alone = {"security": distributed.Security.temporary(), "protocol": "tls://", "host": "127.0.0.1",
@@ -220,10 +220,13 @@ class Dask(Engine):
         now = time.monotonic()
         if now - self._counted > _RECOUNT:
             try:
-                self._counted, self._workers = now, max(1, sum(self._client.nthreads().values()))
+                self._counted, self._workers = now, sum(self._client.nthreads().values())
             except OSError:
                 raise LostCluster(_GONE) from None
-        return self._workers
+            if self._cluster is not None and self._workers < self._started:
+                # Dask gives up a worker that died while it started.
+                self._cluster.scale(self._started)
+        return max(1, self._workers)
 
     def restart(self) -> None:
         """Raise `LostCluster`: broken or cancelled calls mean that the cluster no longer answers."""

@@ -254,7 +254,8 @@ def _directions(system: System, deflections: Array) -> list[_Direction]:
     found = []
     for body in system.bodies:
         omega = body.modes.omega
-        directions, sizes, _ = np.linalg.svd((omega * deflections[:, body.flexible]).T, full_matrices=False)
+        triangle = np.transpose(np.linalg.qr(omega * deflections[:, body.flexible], mode="r"))
+        directions, sizes, _ = np.linalg.svd(triangle, full_matrices=False)
         shapes = body.modes.vectors @ (directions / omega[:, None])
         found += [
             _Direction(size, body.name, body.flexible, omega * directions[:, k], shapes[:, k])

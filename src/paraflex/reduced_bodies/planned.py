@@ -184,8 +184,9 @@ def _vibrating(times: Array, forces: Array, omega: Array) -> Array:
     """
     slopes = np.diff(forces, axis=0) / np.diff(times)[:, None]
     kinks = np.concatenate([slopes[:1], np.diff(slopes, axis=0)]) / omega
-    turns = np.exp(1j * np.outer(times[:-1], omega))
-    return np.max(np.abs(1j * forces[0] + np.cumsum(kinks * turns, axis=0)), axis=0, initial=0.0)
+    turns = np.outer(times[:-1], omega)
+    swings = np.cumsum(kinks * np.cos(turns), axis=0), forces[0] + np.cumsum(kinks * np.sin(turns), axis=0)
+    return np.max(np.hypot(*swings), axis=0, initial=0.0)
 
 
 class Loading(NamedTuple):
