@@ -67,9 +67,9 @@ class Completion:
             motion_forces(packed, q, v, a, acting, found := np.zeros_like(q), scratch)
             return found
 
-        still = np.zeros((len(q), inputs.acting))
+        still, idle, rows = np.zeros((len(q), inputs.acting)), np.zeros(inputs.acting), np.zeros(self.whole.m)
         bodies = under(still)
-        add_reactions(packed, q, multipliers, still[0], forces := bodies.copy(), np.zeros(self.whole.m), scratch)
+        add_reactions(packed, q, multipliers, idle, forces := bodies.copy(), rows, scratch)
         ways = np.zeros((len(q), inputs.acting, self.whole.n))
         for k, motor in zip(inputs.motors, mechanism.motors, strict=True):
             ways[:, k] = -joint_coordinate(self.whole, motor.joint, q).rows

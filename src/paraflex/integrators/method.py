@@ -143,8 +143,8 @@ class NativeMethod(Method):
     ----------
     newton_fraction, fixed_newton_fraction : float
         Default part of the error allowed in a step that Newton's iteration may leave, if the error is controlled and in
-        fixed steps. An error estimate of high order contains the residual of Newton's iteration in the stages: with a
-        large part there are more steps.
+        fixed steps. An error estimate of high order contains the residual of Newton's iteration in the stages: too
+        large a part costs steps.
     """
 
     fixed_step = True
