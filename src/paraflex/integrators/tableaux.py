@@ -133,7 +133,7 @@ class ESDIRK3(ESDIRK):
     title = "ESDIRK 3(2)"
     order = 3
     source = "Kennedy and Carpenter (2003), Appl. Numer. Math. 44, 139-181"
-    newton_fraction: ClassVar[float] = 1e-2
+    newton_fraction: ClassVar[float] = 3e-3
     fixed_newton_fraction: ClassVar[float] = 1e-3
 
     tableau: ClassVar[Tableau] = make_tableau(
@@ -159,7 +159,7 @@ class ESDIRK4(ESDIRK):
     title = "ESDIRK 4(3)"
     order = 4
     source = "Kennedy and Carpenter (2019), Appl. Numer. Math. 146, 221-244"
-    newton_fraction: ClassVar[float] = 1e-2
+    newton_fraction: ClassVar[float] = 3e-3
     fixed_newton_fraction: ClassVar[float] = 1e-3
 
     tableau: ClassVar[Tableau] = make_tableau(
@@ -185,7 +185,7 @@ class ESDIRK5(ESDIRK):
     title = "ESDIRK 5(4)"
     order = 5
     source = "Kennedy and Carpenter (2019), Appl. Numer. Math. 146, 221-244"
-    newton_fraction: ClassVar[float] = 1e-2
+    newton_fraction: ClassVar[float] = 3e-3
     fixed_newton_fraction: ClassVar[float] = 1e-3
 
     tableau: ClassVar[Tableau] = make_tableau(
