@@ -11,17 +11,12 @@ complete, and the first of them must be those of the single process to the last 
 from __future__ import annotations
 
 import random
-import tempfile
 import threading
-import time
-from pathlib import Path
 
 import pandas as pd
 import psutil
 from common import command_line, single_thread, write_json
-
-from paraflex.campaign import Workers
-from paraflex.studies import load_sweep, sweep
+from sweeps import swept
 
 COMPARED = 8192
 STUDY = """
@@ -42,20 +37,10 @@ high = 0.0018
 """
 
 
-def swept(designs: int, engine: str, workers: int) -> tuple[pd.DataFrame, float]:
+def rows_of(designs: int, engine: str, workers: int) -> tuple[pd.DataFrame, float]:
     """The table of a sweep, and its rows a second from the first to the last."""
-    moments: list[float] = []
-    with tempfile.TemporaryDirectory() as name:
-        file = Path(name) / "study.toml"
-        file.write_text(STUDY.format(designs=designs), encoding="utf-8")
-        result = sweep(
-            load_sweep(file),
-            Path(name) / "out",
-            workers=Workers(engine, workers),
-            on_progress=lambda _: moments.append(time.perf_counter()),
-        )
-        assert result.table is not None
-        return pd.read_parquet(result.table), (len(moments) - 1) / (moments[-1] - moments[0])
+    found = swept(STUDY.format(designs=designs), engine, workers)
+    return found.table, (len(found.moments) - 1) / (found.moments[-1] - found.moments[0])
 
 
 def kill_workers(every: float, ended: threading.Event, killed: list[int]) -> None:
@@ -76,14 +61,14 @@ def main() -> None:
     parser.add_argument("--workers", type=int, default=2)
     asked = parser.parse_args()
     single_thread()
-    alone, rate = swept(COMPARED, "processes", 1)
-    together, rate_together = swept(COMPARED, "dask", asked.workers)
+    alone, rate = rows_of(COMPARED, "processes", 1)
+    together, rate_together = rows_of(COMPARED, "dask", asked.workers)
     share = rate_together / asked.workers / rate
     print(f"one process {rate:.1f} rows/s; {asked.workers} Dask workers {rate_together:.1f} rows/s, {share:.0%} each")
     ended, killed = threading.Event(), []
     killer = threading.Thread(target=kill_workers, args=[asked.every, ended, killed], daemon=True)
     killer.start()
-    table, rate_killed = swept(asked.designs, "dask", asked.workers)
+    table, rate_killed = rows_of(asked.designs, "dask", asked.workers)
     ended.set()
     complete = table["status"].tolist().count("complete")
     columns = ["run", "thickness", "stress_max", "status"]

@@ -11,11 +11,9 @@ between its two marks is replaced. Takes twenty minutes.
 
 from __future__ import annotations
 
-import math
 import multiprocessing
 import os
 import statistics
-import tempfile
 import time
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass
@@ -27,15 +25,14 @@ import numpy as np
 from common import command_line, conditions, growth, markdown, single_thread, write_json, write_page
 from numpy.typing import NDArray
 from scaling import MOVING, fastest
+from sweeps import study_of, swept
 
 import paraflex as pf
-from paraflex.campaign import Workers
 from paraflex.compilation import compile_kernels
 from paraflex.designs.run import Task, run_task
 from paraflex.dynamics import build_system, start_state
 from paraflex.integrators import IntegrationOptions, Solution
 from paraflex.mechanism import Geometry, Start, chain_of_segments, four_bars_in_a_row, loops
-from paraflex.studies import SweepStudy, load_sweep, sweep
 from paraflex.tracking import TrackingTask
 
 MODE, METHOD, TOLERANCE = "++++", "tr-bdf2", 1e-4
@@ -171,20 +168,14 @@ def _work(task: TrackingTask, method: str, tolerance: float) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _sweep(geometry: str, designs: int) -> SweepStudy:
-    """Designs of RAParM-I that differ in the thickness of the links, each planned and run in one mode."""
-    with tempfile.TemporaryDirectory() as name:
-        file = Path(name) / "study.toml"
-        file.write_text(
-            DESIGNS.format(geometry=geometry, mode=MODE, designs=designs, method=METHOD, tolerance=TOLERANCE),
-            encoding="utf-8",
-        )
-        return load_sweep(file)
+def _text(geometry: str, designs: int) -> str:
+    """A sweep of RAParM-I whose designs differ in the thickness of the links, each planned and run in one mode."""
+    return DESIGNS.format(geometry=geometry, mode=MODE, designs=designs, method=METHOD, tolerance=TOLERANCE)
 
 
 def _many(geometry: str, count: int) -> float:
     """Seconds each, of so many designs of a sweep one after the other."""
-    study = _sweep(geometry, count + 1)
+    study = study_of(_text(geometry, count + 1))
     tasks = [Task(k, k, tuple(row.tolist()), "square") for k, row in enumerate(study.designs)]
     run_task(study.setting, tasks[0])
     began = time.perf_counter()
@@ -208,19 +199,11 @@ def study(count: int, designs: int) -> list[dict[str, Any]]:
         out.append(
             {
                 "geometry": geometry.value, "alone": alone, "together": together, "processors": processors,
-                "efficiency": alone / together, "designs": designs, "predicted": together * designs / processors,
-                "swept": _swept(geometry.value, designs, processors) if designs else math.nan,
+                "designs": designs, "predicted": together * designs / processors,
+                "swept": swept(_text(geometry.value, designs), "processes", processors).seconds if designs else None,
             }
         )  # fmt: skip
     return out
-
-
-def _swept(geometry: str, designs: int, processors: int) -> float:
-    """Seconds of a sweep in processes, of their start to the last row of the table."""
-    with tempfile.TemporaryDirectory() as name:
-        began = time.perf_counter()
-        sweep(_sweep(geometry, designs), Path(name) / "out", workers=Workers("processes", processors))
-        return time.perf_counter() - began
 
 
 def hours(design: dict[str, Any], cores: int, runs: int = STUDY) -> float:

@@ -14,22 +14,18 @@ from __future__ import annotations
 
 import argparse
 import json
-import tempfile
-import time
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 from common import command_line, write_json
 from models import SECOND_ORDER
+from sweeps import swept
 
-from paraflex.campaign import Workers
 from paraflex.compilation import compile_kernels
 from paraflex.dynamics.points import point_motion
 from paraflex.errors import IntegrationError
 from paraflex.files import load
 from paraflex.integrators import IntegrationOptions
-from paraflex.studies import load_sweep, sweep
 from paraflex.tracking import TrackingTask, plan_tracking
 
 DEVIATION, CONVERGED = 1.2e-5, 1e-7
@@ -126,18 +122,9 @@ def told(setting: dict[str, Any], between: str) -> str:
 
 def runs_a_second(engine: str, workers: int, modes: list[str], designs: int, setting: dict[str, Any]) -> float:
     """Between the first design that is done and the last."""
-    moments: list[float] = []
-    with tempfile.TemporaryDirectory() as name:
-        file = Path(name) / "study.toml"
-        said = STUDY.format(modes=json.dumps(modes), designs=designs, method=METHOD, setting=told(setting, "\n"))
-        file.write_text(said, encoding="utf-8")
-        # Two designs that end at once would make too much of a short sweep: the first of each worker is not counted.
-        sweep(
-            load_sweep(file),
-            Path(name) / "out",
-            workers=Workers(engine, workers),
-            on_progress=lambda _: moments.append(time.perf_counter()),
-        )
+    said = STUDY.format(modes=json.dumps(modes), designs=designs, method=METHOD, setting=told(setting, "\n"))
+    moments = swept(said, engine, workers).moments
+    # Two designs that end at once would make too much of a short sweep: the first of each worker is not counted.
     return (designs - workers) * len(modes) / (moments[-1] - moments[workers - 1])
 
 

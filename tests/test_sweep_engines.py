@@ -367,13 +367,24 @@ def sleep_long(task):
     time.sleep(0.3)
 
 
-def test_workers_that_dask_has_given_up_are_started_again():
-    """As after a death while it started, of which Dask keeps neither the worker nor its supervisor."""
+@pytest.mark.parametrize("kept", [False, True])
+def test_workers_that_dask_has_given_up_are_started_again(kept):
+    """As after a death while it started: Dask closes the worker's supervisor, and may keep its name."""
     with open_engine("dask", 1) as engine:
         cluster = engine._cluster
-        cluster.sync(cluster.workers.pop(0).close)
+        supervisor = cluster.workers[0] if kept else cluster.workers.pop(0)
+        cluster.sync(supervisor.close)
         found = {}
         computing = threading.Thread(target=lambda: found.update(outcomes(engine, abs, [-3])), daemon=True)
         computing.start()
         computing.join(60.0)
         assert found == {-3: 3}
+
+
+def test_a_cluster_whose_workers_die_while_it_starts_is_reported(monkeypatch):
+    def dying(**_):
+        raise RuntimeError("Nanny failed to start.")
+
+    monkeypatch.setattr(distributed, "LocalCluster", dying)
+    with pytest.raises(LostCluster, match=r"died while they started \(Nanny failed to start.\); run the same command"):
+        open_engine("dask", 1)

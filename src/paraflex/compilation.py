@@ -22,8 +22,10 @@ from .errors import as_enum
 from .integrators import IntegrationOptions, make_problem
 from .integrators.native import NativeRun, prepare
 from .interrupts import starting_processes
+from .kernel.constraints import add_reactions
 from .kernel.march import march
 from .kernel.notice import LOG, announce_compiling
+from .kernel.packed import make_scratch
 from .kernel.plain import PLAIN, STATE
 from .kinematics import Line
 from .mechanism import FlexibleBeam, Geometry, Material, Mechanism, Section, raparm_i
@@ -127,6 +129,10 @@ def _call_start(geometry: Geometry) -> None:
     check_accelerations(system, beam.problem.signals, 0.0, still.q, still.v)
     # A linear model.
     Tangency(system).at(MotionPoint(0.0, still.q, still.v, np.zeros(system.n), np.zeros(0), np.zeros(0)))
+    # Shapes and stresses of a reduced run.
+    system.jacobian(still.q)
+    one, none = np.zeros((1, system.n)), np.zeros(0)
+    add_reactions(system.packed, one, np.zeros((1, 0)), none, one.copy(), none, make_scratch(system.packed))
 
 
 def _call_plan(_: Geometry) -> None:

@@ -192,17 +192,21 @@ class Dask(Engine):
         remedy = "pip install 'paraflex[cluster]'"
         with optional_package("Dask is not installed", field="--engine", value=DASK, remedy=remedy):
             distributed: Any = import_module("distributed")
-        self._cluster, self._started = None, workers
+        self._cluster: Any = None
+        self._started = workers
         if address is None:
             # Only this process has the TLS keys, and no dashboard port is open.
             alone = {"security": distributed.Security.temporary(), "protocol": "tls://", "host": "127.0.0.1",
                      "dashboard_address": "127.0.0.1:0", "worker_dashboard_address": None,
                      "scheduler_kwargs": {"dashboard": False}, "silence_logs": logging.CRITICAL}  # fmt: skip
             silent = {f"distributed.{each}.http.routes": [] for each in ("scheduler", "worker")}
-            with import_module("dask").config.set(silent):
-                self._cluster = _apart(
-                    lambda: distributed.LocalCluster(n_workers=workers, threads_per_worker=1, **alone)
-                )
+            try:
+                with import_module("dask").config.set(silent):
+                    self._cluster = _apart(
+                        lambda: distributed.LocalCluster(n_workers=workers, threads_per_worker=1, **alone)
+                    )
+            except RuntimeError as error:
+                raise LostCluster(f"workers died while they started ({error}); run the same command again") from None
         try:
             if address is not None:
                 _apart(lambda: _reach(address))  # in a thread, because a notebook has an event loop of its own
@@ -224,9 +228,15 @@ class Dask(Engine):
             except OSError:
                 raise LostCluster(_GONE) from None
             if self._cluster is not None and self._workers < self._started:
-                # Dask gives up a worker that died while it started.
-                self._cluster.scale(self._started)
+                self._restore()
         return max(1, self._workers)
+
+    def _restore(self) -> None:
+        """Start workers of the own cluster that Dask has given up, because they died while they started."""
+        for name, worker in list(self._cluster.workers.items()):
+            if worker.status.name in ("failed", "closed"):
+                self._cluster.workers.pop(name, None)
+        self._cluster.scale(self._started)
 
     def restart(self) -> None:
         """Raise `LostCluster`: broken or cancelled calls mean that the cluster no longer answers."""
@@ -371,10 +381,9 @@ def outcomes(engine: Engine, function: Callable[..., R], tasks: Iterable[T]) -> 
                 # Dask gives up a call after several of its workers have died.
                 if type(error).__name__ != "KilledWorker":
                     raise
-                if len(bundle) > 1:
-                    yield from outcomes(engine, function, bundle)
-                    continue
-                seconds, results = math.inf, [LostWorker(f"every worker that took it died: {error}")]
+                lost = LostWorker(f"every worker that took it died: {error}")
+                yield from outcomes(engine, function, bundle) if len(bundle) > 1 else ((task, lost) for task in bundle)
+                continue
             yield from zip(bundle, results, strict=True)
             size = max(1, min(2 * len(bundle), engine.most, int(_BUNDLE * len(bundle) / seconds)))
         if suspects:

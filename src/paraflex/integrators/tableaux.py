@@ -126,15 +126,20 @@ class TRBDF2(ESDIRK):
     )
 
 
-class ESDIRK3(ESDIRK):
+class HighOrderESDIRK(ESDIRK):
+    """Scheme of order three or more, whose error estimate is small beside what Newton's iteration may leave."""
+
+    newton_fraction: ClassVar[float] = 3e-3
+    fixed_newton_fraction: ClassVar[float] = 1e-3
+
+
+class ESDIRK3(HighOrderESDIRK):
     """ESDIRK3(2)4L[2]SA: L-stable."""
 
     name = "esdirk3"
     title = "ESDIRK 3(2)"
     order = 3
     source = "Kennedy and Carpenter (2003), Appl. Numer. Math. 44, 139-181"
-    newton_fraction: ClassVar[float] = 3e-3
-    fixed_newton_fraction: ClassVar[float] = 1e-3
 
     tableau: ClassVar[Tableau] = make_tableau(
         [
@@ -152,15 +157,13 @@ class ESDIRK3(ESDIRK):
     )  # fmt: skip
 
 
-class ESDIRK4(ESDIRK):
+class ESDIRK4(HighOrderESDIRK):
     """ESDIRK4(3)6L[2]SA: L-stable."""
 
     name = "esdirk4"
     title = "ESDIRK 4(3)"
     order = 4
     source = "Kennedy and Carpenter (2019), Appl. Numer. Math. 146, 221-244"
-    newton_fraction: ClassVar[float] = 3e-3
-    fixed_newton_fraction: ClassVar[float] = 1e-3
 
     tableau: ClassVar[Tableau] = make_tableau(
         paired_rows("1/4", [
@@ -178,15 +181,13 @@ class ESDIRK4(ESDIRK):
     )  # fmt: skip
 
 
-class ESDIRK5(ESDIRK):
+class ESDIRK5(HighOrderESDIRK):
     """ESDIRK5(4)7L[2]SA2: L-stable."""
 
     name = "esdirk5"
     title = "ESDIRK 5(4)"
     order = 5
     source = "Kennedy and Carpenter (2019), Appl. Numer. Math. 146, 221-244"
-    newton_fraction: ClassVar[float] = 3e-3
-    fixed_newton_fraction: ClassVar[float] = 1e-3
 
     tableau: ClassVar[Tableau] = make_tableau(
         paired_rows("23/125", [
