@@ -93,6 +93,30 @@ sys.argv = ["paraflex", "info"]
 from paraflex.__main__ import main
 main()
 """
+# One in llvmlite, whose code must not be left with two owners.
+OWNED = """
+import sys
+from llvmlite.binding import linker
+class Source:
+    def detach(self):
+        print("owned", flush=True)
+def link(*_):
+    print("linking", flush=True)
+    try:
+        __import__("time").sleep(0.5)
+    except KeyboardInterrupt:
+        print("cut short", flush=True)
+        raise
+def work(request):
+    lib = types.SimpleNamespace(LLVMPY_LinkModules=link)
+    linker.ffi = types.SimpleNamespace(OutputString=__import__("contextlib").nullcontext, lib=lib)
+    linker.link_modules(None, Source())
+    __import__("time").sleep(600)
+answer(work)
+sys.argv = ["paraflex", "info"]
+from paraflex.__main__ import main
+main()
+"""
 # A library in which an interrupt is lost: nothing can be raised where an object goes.
 LOST = """
 import sys
@@ -198,7 +222,12 @@ def test_imports_before_the_command_begins_end_at_once(number, code):
 
 @pytest.mark.parametrize(
     ("script", "when", "last"),
-    [(LATE, "importing", "imported"), (LOST, "going", "going"), (OTHER, "working", "working")],
+    [
+        (LATE, "importing", "imported"),
+        (OWNED, "linking", "owned"),
+        (LOST, "going", "going"),
+        (OTHER, "working", "working"),
+    ],
 )
 def test_libraries_do_not_keep_a_command_from_ending(script, when, last):
     with started(sys.executable, "-c", ANSWER + script) as child:

@@ -4,6 +4,7 @@ import errno
 import gc
 import os
 import shutil
+import signal
 from pathlib import Path
 
 import pytest
@@ -204,3 +205,16 @@ def test_what_cannot_be_kept_is_compiled_all_the_same(tmp_path, monkeypatch):
         cache._save_overload(None, None)
     assert len(said) == 1
     assert said[0].endswith("(no space left on device): the next process compiles anew")
+
+
+def test_an_interrupt_waits_until_a_kernel_is_loaded(monkeypatch):
+    loaded = []
+
+    def load(*_):
+        signal.raise_signal(signal.SIGINT)
+        loaded.append(True)
+
+    monkeypatch.setattr(disk_cache.FunctionCache, "load_overload", load)
+    with pytest.raises(KeyboardInterrupt):
+        disk_cache.KernelCache(python).load_overload(None, None)
+    assert loaded

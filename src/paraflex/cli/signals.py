@@ -18,10 +18,10 @@ from paraflex.interrupts import ENDING
 
 # Signals within this time of the last one raised are repetitions [s]: a terminal that closes may send two.
 _ONCE = 1.0
-# Longest delay of a signal during an import, as a half-imported module cannot be imported again; and time between two
-# attempts to raise it [s].
-_IMPORTS, _AGAIN = 1.5, 0.02
-_IMPORTING = "<frozen importlib._bootstrap>"
+# Longest delay of a signal during an import, as a half-imported module cannot be imported again, or during a step of
+# llvmlite, between whose calls compiled code may have two owners; and time between two attempts to raise it [s].
+_DELAY, _AGAIN = 1.5, 0.02
+_IMPORTING, _OWNING = "<frozen importlib._bootstrap>", os.path.join("llvmlite", "binding", "")
 
 
 class _Taken:
@@ -82,16 +82,17 @@ def _raise(number: int, frame: FrameType | None) -> None:
     now = time.monotonic()
     if _Taken.number is None:
         _Taken.number, _Taken.first, _Taken.raised = number, now, 0.0
-    if now - _Taken.first < _IMPORTS and _is_importing(frame):
+    if now - _Taken.first < _DELAY and _is_delaying(frame):
         _resend_later(number)
     elif now - _Taken.raised > _ONCE:
         _Taken.raised = now
         raise KeyboardInterrupt
 
 
-def _is_importing(frame: FrameType | None) -> bool:
+def _is_delaying(frame: FrameType | None) -> bool:
     while frame is not None:
-        if frame.f_code.co_filename == _IMPORTING:
+        file = frame.f_code.co_filename
+        if file == _IMPORTING or _OWNING in file:
             return True
         frame = frame.f_back
     return False

@@ -16,6 +16,7 @@ from typing import Any
 
 from numba.core.caching import FunctionCache, IndexDataCacheFile
 
+from ..interrupts import uninterrupted
 from .notice import announce_damage, announce_disk_full
 from .plain import STATE
 
@@ -78,6 +79,11 @@ class KernelCache(FunctionCache):
         # The function may be defined in a file outside paraflex.
         stamp = self._impl.locator.get_source_stamp()
         self._cache_file = _Sealed(self._cache_path, self._impl.filename_base, stamp)
+
+    def load_overload(self, sig: Any, target_context: Any) -> Any:
+        # An interrupt between two of llvmlite's steps could leave code with two owners, each of which deletes it.
+        with uninterrupted():
+            return super().load_overload(sig, target_context)
 
     def _save_overload(self, sig: Any, data: Any) -> None:
         try:
