@@ -93,6 +93,7 @@ SLIPS = [
     ("Mechanism('m',{'O':(0,0)},RigidBody('b',1,1),[],end_effector='b.C')", "end_effector.point: unknown point"),
     ("Mechanism(3,{},RigidBody('b',1,1),[])", "name: not a text"),
     ("pf.IntegrationOptions(tolerance='1e-5')", "tolerance: not a number"),
+    ("pf.IntegrationOptions(newton_fraction=float('inf'))", "newton_fraction: must be below 1"),
     ("pf.IntegrationOptions(events='A')", "events: not an event"),
     ("pf.JointLimit('A','90',1)", "low: not a number"),
     ("pf.Circle((0,0),'1',3)", "radius: not a number"),

@@ -402,10 +402,47 @@ def test_vibrations_of_a_spring_that_a_force_begins():
     omega, t = np.array([10.0, 20.0]), np.linspace(0.0, 2.0 * np.pi / 10.0, 201)
     ramp = np.minimum(t / (np.pi / 10.0), 1.0)
     slope = 10.0 / np.pi
-    found = _vibrating(t, np.column_stack([ramp, ramp]), omega)
+    smooth = np.zeros(200, dtype=bool)
+    found = _vibrating(t, np.column_stack([ramp, ramp]), omega, smooth)
     # Half a period of the first: the second kink doubles its vibration. A whole period of the second.
     assert found == pytest.approx([2.0 * slope / 10.0, slope / 20.0], rel=1e-6)
-    assert _vibrating(t, np.ones((201, 2)), omega) == pytest.approx([1.0, 1.0])
+    assert _vibrating(t, np.ones((201, 2)), omega, smooth) == pytest.approx([1.0, 1.0])
+
+
+def test_vibrations_of_a_spring_that_a_jump_begins():
+    """Against a simulated oscillator, however long an interval is; the force begins with a jump itself."""
+    from paraflex.reduced_bodies.planned import _vibrating
+
+    t, omega, jumping = np.linspace(0.0, 1.0, 51), np.array([37.0, 301.0]), np.arange(50) == 20
+    force = np.sin(5.0 * t) + 1.3 - 2.2 * (t > 0.405)
+    # Velocity u' / omega and deflection u under a force that is linear in each interval: u - force turns.
+    u, most = np.zeros((2, 2)), np.zeros(2)
+    for k in range(50):
+        slope = 0.0 if jumping[k] else (force[k + 1] - force[k]) / 0.02
+        u -= np.array([[force[k + 1] if jumping[k] else force[k]] * 2, slope / omega])
+        cosine, sine = np.cos(0.02 * omega), np.sin(0.02 * omega)
+        u = np.array([cosine * u[0] + sine * u[1], cosine * u[1] - sine * u[0]])
+        most = np.maximum(most, np.hypot(*u))
+        u += np.array([[force[k + 1]] * 2, slope / omega])
+    assert _vibrating(t, np.column_stack([force, force]), omega, jumping) == pytest.approx(most, rel=1e-9)
+
+
+def test_a_load_that_jumps_is_a_finding_and_shapes_for_it_do_not_depend_on_samples():
+    model, kept = pf.load("five_bar"), []
+    blow = pf.PiecewiseProfile((pf.ConstantSpeed(0.0, 0.0), pf.ConstantSpeed(20.0, 0.0)), (0.2,))
+    push = pf.PointForce("push", pf.PointRef("distal1", "C"), (blow, 0.0))
+    for samples in (51, 701):
+        task = pf.plan(replace(model.mechanism, loads=(push,)), model.paths["square"], duration=0.5, samples=samples)
+        chosen = pf.planned_reduction(task, 1e-4)
+        kept.append(task.remodelled(chosen.mechanism).system.n_flexible)
+    # The choice at one number of samples is that at another but for rounding of a shape at the limit.
+    assert abs(kept[0] - kept[1]) <= 2
+    # As many again as without the jump, whose steep slope few samples would hide.
+    still = pf.plan(model.mechanism, model.paths["square"], duration=0.5, samples=51)
+    assert kept[0] > 1.5 * still.remodelled(pf.planned_reduction(still, 1e-4).mechanism).system.n_flexible
+    few = task.remodelled(chosen.mechanism)
+    assert "reduced-jumps" in codes(pf.run_study(few, ["++"], reduction=chosen, warning=False).data)
+    assert "reduced-jumps" not in codes(pf.run_study(task, ["++"], warning=False).data)
 
 
 def test_the_command_keeps_as_few_as_the_tolerance_allows(tmp_path):

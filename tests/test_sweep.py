@@ -532,3 +532,10 @@ def test_path_durations_keep_the_share_of_dwell():
     square, line = model.path("square"), model.path("line")
     assert model.duration(square) == model.duration("square") == 0.7
     assert model.duration(line) == pytest.approx(0.7 * line.duration / square.duration)
+
+
+def test_threads_that_were_asked_for_take_no_cluster(tmp_path):
+    elsewhere = ("--engine", "threads", "--cluster", "tcp://127.0.0.1:9")
+    done = shell("sweep", write(tmp_path), "--output", tmp_path / "out", *elsewhere)
+    assert done.returncode == 2
+    assert "--cluster: only the engine dask takes a cluster" in done.stderr

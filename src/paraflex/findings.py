@@ -102,6 +102,7 @@ _DOUBTFUL = {
     "path-ill-conditioned": "A mode passes near a singular position of its motors.",
     "reduced-too-far": "A run with few flexible coordinates is far from the run with all of them.",
     "reduced-beyond-plan": "A run with few flexible coordinates bends beams far more than its plan did.",
+    "reduced-jumps": "Loads jump in a run with few flexible coordinates: joint forces and stresses are uncertain.",
     "modes-too-stiff": "The modes kept of a beam cannot represent a moment applied to it.",
     "equilibrium-unstable": "A static equilibrium is unstable: the mechanism would move away from it.",
     "motions-grow": "Some motions about the pose grow instead of vibrating.",

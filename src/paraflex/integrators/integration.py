@@ -274,6 +274,7 @@ class Integration:
         solution = whole if self._between is None else self._between.kept(whole)
         known = (*self._ends.findings(solution.q), *filter(None, [self._loose]))
         mesh, samples, kept = elements_too_few(system, run.problem.limits), self._samples, solution
+        known += tuple(_excited_beyond_shapes(system, run.problem.jumps[run.problem.jumps < run.time]))
 
         def findings() -> Iterator[Finding]:
             # Loads between samples take as long to compute as a tenth of a run, and studies of many runs rarely ask.
@@ -334,6 +335,18 @@ class Integration:
             )
         moment = Moment(now.t, solution.steps + (0 if self._begun is None else self._begun.steps))
         return error(cause, moment, solution, remedy)
+
+
+def _excited_beyond_shapes(system: System, jumps: Array) -> Iterator[Finding]:
+    """Yield a finding if inputs jumped at some times, which also excites the shapes that reduced bodies lack."""
+    if jumps.size and system.mechanism.bases:
+        yield Finding(
+            "reduced-jumps",
+            "study.reduced",
+            f"torques, loads or prescribed motions jump, first at t = {jumps[0]:.4g} s: of the vibrations that follow, "
+            "the shapes kept hold those that move the end-effector, and joint forces and stresses need more",
+            "keep all flexible coordinates for these, or let jumps rise over some milliseconds",
+        )
 
 
 def _failed(error: IntegrationError) -> IntegrationError:

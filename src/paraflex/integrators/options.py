@@ -132,6 +132,9 @@ class IntegrationOptions(CheckedFields):
             value = getattr(self, name)
             if value is not None and not value > 0:
                 raise InputError("must be positive", field=name, value=value, remedy=remedy)
+        if self.newton_fraction is not None and not self.newton_fraction < 1.0:
+            remedy = _REMEDIES["newton_fraction"]
+            raise InputError("must be below 1", field="newton_fraction", value=self.newton_fraction, remedy=remedy)
         if self.tolerance is not None and not math.isfinite(self.tolerance):
             raise InputError("must be finite", field="tolerance", value=self.tolerance, remedy=_REMEDIES["tolerance"])
         for name in ("alpha", "beta"):

@@ -81,7 +81,10 @@ class KernelCache(FunctionCache):
         self._cache_file = _Sealed(self._cache_path, self._impl.filename_base, stamp)
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:
-        # An interrupt between two of llvmlite's steps could leave code with two owners, each of which deletes it.
+        """Load the code compiled for a signature, without interruption.
+
+        Between two of llvmlite's steps code has two owners: an interrupt there would let both delete it.
+        """
         with uninterrupted():
             return super().load_overload(sig, target_context)
 

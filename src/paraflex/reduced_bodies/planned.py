@@ -33,7 +33,7 @@ import numpy as np
 import scipy
 from scipy.sparse import csr_matrix as Sparse
 
-from paraflex.arrays import Array
+from paraflex.arrays import Array, Mask
 from paraflex.dynamics import System, acting_loads, joint_coordinate
 from paraflex.dynamics.linearise import DENSE_COORDINATES, all_modes, typical_square
 from paraflex.dynamics.points import marker_place
@@ -41,7 +41,7 @@ from paraflex.dynamics.sparse import Saddle, elastic_stiffness, sparse_jacobian,
 from paraflex.dynamics.tangents import MotionPoint, Tangency
 from paraflex.kernel.bodies import motion_forces
 from paraflex.kernel.packed import make_scratch
-from paraflex.mechanism import ActuationMode
+from paraflex.mechanism import ActuationMode, Mechanism
 from paraflex.tracking import TrackingTask, undeformed_at
 
 # Largest number of instants whose forces act in each pose.
@@ -133,6 +133,7 @@ class PlannedDeflections:
     def contributions(self, loading: "Loading") -> "Contributions":
         """Return deflections under a loading, and vibrations by it, with the deviations that they cause."""
         times = self.task.motion.t
+        jumping = _jumping(self.task.mechanism, times)
         # Between two poses the forces act in the nearer one.
         bounds = [0, *((one + other) // 2 + 1 for one, other in pairwise(self.samples)), times.size]
         found, half = [], (times[-1] - times[0]) ** 2 / 2.0
@@ -147,7 +148,7 @@ class PlannedDeflections:
             drift = structure.static_displacements(half * turned)
             found.append(self._products(statics, np.concatenate([at_effector, drift]), instants.size))
             units, omega = structure.vibrations(np.concatenate([statics, at_effector]))
-            vibrating = _vibrating(times, loading.forces @ units.T, omega)
+            vibrating = _vibrating(times, loading.forces @ units.T, omega, jumping)
             swing = np.linalg.norm(rows @ units.T, axis=0) * vibrating
             found.append(Contributions(units, swing * omega * (times[-1] - times[0]) / 2.0, 2.0 * swing))
             pushed = np.linalg.norm(rows @ free.T, 2) * half * vibrating**2 / (2.0 * self._length)
@@ -177,16 +178,27 @@ class PlannedDeflections:
         return Contributions(*(np.concatenate(parts) for parts in zip(*found, strict=True)))
 
 
-def _vibrating(times: Array, forces: Array, omega: Array) -> Array:
+def _vibrating(times: Array, forces: Array, omega: Array, jumping: Mask) -> Array:
     """Return the part of modal forces (samples, f) that vibrates, as its largest amplitude (f,).
 
-    Between samples forces are linear, so that vibrations are those that each change of their slope begins.
+    Vibrations begin at jumps of the forces, which are given by the intervals (samples - 1,) that hold one, and at each
+    change of their slope: elsewhere forces are linear between samples.
     """
-    slopes = np.diff(forces, axis=0) / np.diff(times)[:, None]
+    changes = np.diff(forces, axis=0)
+    jumps = np.where(jumping[:, None], changes, 0.0)
+    slopes = (changes - jumps) / np.diff(times)[:, None]
     kinks = np.concatenate([slopes[:1], np.diff(slopes, axis=0)]) / omega
-    turns = np.outer(times[:-1], omega)
-    swings = np.cumsum(kinks * np.cos(turns), axis=0), forces[0] + np.cumsum(kinks * np.sin(turns), axis=0)
-    return np.max(np.hypot(*swings), axis=0, initial=0.0)
+    cosines, sines = np.cos(turns := np.outer(times[:-1], omega)), np.sin(turns)
+    swings = kinks * cosines + jumps * sines, jumps * cosines - kinks * sines
+    swings[1][0] += forces[0]
+    return np.max(np.hypot(*np.cumsum(swings, axis=1)), axis=0, initial=0.0)
+
+
+def _jumping(mechanism: Mechanism, times: Array) -> Mask:
+    """Return which intervals between times (k - 1,) hold a jump of a load, or end with one."""
+    knots = np.array([knot for load in mechanism.loads for profile in load.profiles for knot in profile.knots])
+    jumps = np.any(acting_loads(mechanism, knots) != acting_loads(mechanism, knots, before=True), axis=1)
+    return np.isin(np.arange(1, times.size), np.searchsorted(times, knots[jumps]))
 
 
 class Loading(NamedTuple):

@@ -110,8 +110,9 @@ class FilesChoice:
 class WorkersChoice:
     """Choice of the workers that compute the runs of a study."""
 
-    engine: str = option(
-        "--engine threads|processes|dask", "Engine that computes; results are the same.", default="threads"
+    engine: str | None = option(
+        "--engine threads|processes|dask",
+        "Engine that computes; results are the same. Default: threads, or dask with --cluster.",
     )
     workers: int | None = option("--workers N", "Number of workers. Default: one per processor.")
     cluster: str | None = option(
@@ -120,8 +121,8 @@ class WorkersChoice:
 
     @property
     def chosen(self) -> Workers:
-        """Workers in the form that studies take; an address of a cluster selects Dask in place of threads."""
+        """Workers in the form that studies take."""
         from paraflex.campaign import Workers  # needed when a study is run, not for the help
 
-        engine = "dask" if self.cluster is not None and self.engine == "threads" else self.engine
-        return Workers(engine, self.workers, self.cluster)
+        engine = "threads" if self.cluster is None else "dask"
+        return Workers(self.engine or engine, self.workers, self.cluster)
