@@ -9,7 +9,7 @@ KERNELS := $(wildcard src/paraflex/kernel/*.py)
 # Images often set it: every process would compile all of the package anew.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: run test lint types imports tests coverage docs clean
+.PHONY: run test lint types imports tests coverage docs wheel clean
 
 run: $(VENV)/.run
 	$(BIN)/paraflex run --out results
@@ -19,8 +19,8 @@ test:
 	$(MAKE) --jobs 2 lint types imports docs tests
 
 lint: $(VENV)/.dev
-	$(BIN)/ruff format --check src tests benchmarks examples docs/hooks docs/notebooks
-	$(BIN)/ruff check src tests benchmarks examples docs/hooks docs/notebooks
+	$(BIN)/ruff format --check src tests benchmarks examples docs/hooks docs/notebooks hatch_build.py
+	$(BIN)/ruff check src tests benchmarks examples docs/hooks docs/notebooks hatch_build.py
 
 # The second looks at the installed package as those who import it do: every public name has a type.
 types: $(VENV)/.dev
@@ -56,6 +56,12 @@ $(VENV)/.dev: $(VENV)/.run
 $(VENV)/.kernels: $(VENV)/.run $(KERNELS)
 	$(BIN)/python -m paraflex.compilation
 	touch $@
+
+# A wheel with compiled kernels, for this release of Python: what is installed with it starts without compiling.
+wheel: $(VENV)/.dev
+	rm -rf $(VENV)/wheel
+	NUMBA_CACHE_DIR=$(VENV)/wheel $(BIN)/python -m paraflex.compilation
+	PARAFLEX_KERNELS=$(VENV)/wheel $(BIN)/python -m build --no-isolation --wheel
 
 clean:
 	rm -rf $(VENV) site results .coverage .pytest_cache .ruff_cache

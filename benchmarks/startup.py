@@ -1,10 +1,11 @@
 """How long does it take to start? Commands and imports in fresh processes, and the first compilation.
 
-    python benchmarks/startup.py [--compile] [--repeats N] [--write]
+    python benchmarks/startup.py [--compile] [--wheel FILE] [--repeats N] [--write]
 
 Times are of whole processes, the least and the median of several, files in the page cache and kernels compiled, and
 beside them processor time, which says more on a machine that is busy. So do an empty Python and Numba alone. With
---compile all kernels are compiled into an empty folder, and found there by a second process. The table has the goals.
+--compile all kernels are compiled into an empty folder, and found there by a second process. With --wheel the first run
+after an installation is timed: of a wheel of `make wheel`, unpacked. The table has the goals.
 """
 
 from __future__ import annotations
@@ -16,12 +17,14 @@ import subprocess
 import sys
 import tempfile
 import time
+import zipfile
 from dataclasses import asdict, dataclass
 
 from common import command_line, table, write_json
 
 GOALS = {
-    "paraflex --help": 0.15, "paraflex info raparm_i": 0.6, "paraflex draw raparm_i": 0.9, "compile all kernels": 15.0
+    "paraflex --help": 0.15, "paraflex info raparm_i": 0.6, "paraflex draw raparm_i": 0.9, "compile all kernels": 15.0,
+    "first run of a wheel": 8.0,
 }  # fmt: skip
 PROCESSES = {
     "python": ["-c", "pass"],
@@ -84,8 +87,20 @@ def compilation() -> list[Start]:
         return [first, timed("find them compiled", COMPILE, 1, NUMBA_CACHE_DIR=folder)]
 
 
+def first_run(wheel: str) -> Start:
+    """Of what the paper studies, without figures, with the kernels that the wheel has and no others."""
+    with tempfile.TemporaryDirectory() as folder:
+        installed, out = os.path.join(folder, "installed"), os.path.join(folder, "out")
+        with zipfile.ZipFile(wheel) as archive:
+            archive.extractall(installed)
+        command = ["-m", "paraflex", "run", "--no-figures", "--out", out]
+        empty = os.path.join(folder, "empty")
+        return timed("first run of a wheel", command, 1, PYTHONPATH=installed, NUMBA_CACHE_DIR=empty)
+
+
 def main() -> None:
     parser = command_line(__doc__)
+    parser.add_argument("--wheel", help="a wheel with compiled kernels")
     parser.add_argument("--compile", action="store_true", help="measure the first compilation: minutes")
     parser.add_argument("--repeats", type=int, default=7)
     given = parser.parse_args()
@@ -96,6 +111,8 @@ def main() -> None:
         found.append(timed(name, arguments, given.repeats))
     if given.compile:
         found += compilation()
+    if given.wheel:
+        found.append(first_run(given.wheel))
     print(table(["seconds", "least", "median", "processor", "goal"], [start.row for start in found]))
     write_json("startup", {"repeats": given.repeats, "starts": [asdict(start) for start in found]}, given.folder)
 

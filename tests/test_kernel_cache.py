@@ -8,10 +8,12 @@ import signal
 from pathlib import Path
 
 import pytest
+from llvmlite import binding
+from numba.core import config
 
 import paraflex
 import processes
-from paraflex.kernel import disk_cache, notice
+from paraflex.kernel import disk_cache, notice, processor
 from paraflex.kernel.compiling import Kernel
 
 # The row of a prescribed angle: a kernel of constraints.py calls one of joints.py, which writes a torque of one there.
@@ -214,7 +216,24 @@ def test_an_interrupt_waits_until_a_kernel_is_loaded(monkeypatch):
         signal.raise_signal(signal.SIGINT)
         loaded.append(True)
 
-    monkeypatch.setattr(disk_cache.FunctionCache, "load_overload", load)
+    monkeypatch.setattr(disk_cache.FunctionCache, "_load_overload", load)
     with pytest.raises(KeyboardInterrupt):
-        disk_cache.KernelCache(python).load_overload(None, None)
+        disk_cache.KernelCache(python)._load_overload(None, None)
     assert loaded
+
+
+@pytest.mark.skipif(binding.get_process_triple().split("-")[0] != "x86_64", reason="levels of x86-64")
+def test_processors_of_a_level_share_kernels_and_others_have_their_own(monkeypatch):
+    monkeypatch.setitem(vars(config), "CPU_NAME", None)
+    level = dict.fromkeys(("avx2", "bmi", "bmi2", "f16c", "fma", "lzcnt", "movbe"), True)
+    found = []
+    for name, features in (("znver4", level | {"avx512f": True}), ("haswell", level), ("nehalem", {"sse4.2": True})):
+        monkeypatch.setattr(binding, "get_host_cpu_name", lambda name=name: name)
+        monkeypatch.setattr(binding, "get_host_cpu_features", lambda features=features: binding.FeatureMap(features))
+        for each in (processor._level, processor.processor):
+            each.cache_clear()
+        found.append(processor.processor())
+    for each in (processor._level, processor.processor):
+        each.cache_clear()
+    assert found[0] == found[1] == (binding.get_process_triple(), "x86-64-v3")
+    assert found[2][1:] == ("nehalem", "+sse4.2")

@@ -2,6 +2,7 @@
 
 import email
 import re
+import shutil
 import sys
 import tarfile
 import tomllib
@@ -10,6 +11,8 @@ from pathlib import Path
 
 import pytest
 
+from paraflex.compilation import compile_all_kernels
+from paraflex.kernel.march import march
 from processes import python, run
 
 ROOT = Path(__file__).parents[1]
@@ -62,7 +65,16 @@ def test_all_extras_but_that_of_developers_are_in_all():
 def test_the_source_distribution_can_be_worked_with(built):
     with tarfile.open(built / f"{NAME}.tar.gz") as archive:
         there = {name.removeprefix(f"{NAME}/") for name in archive.getnames()}
-    files = ("README.md", "LICENSE", "CITATION.cff", "CONTRIBUTING.md", "Makefile", "constraints.txt", "mkdocs.yml")
+    files = (
+        "hatch_build.py",
+        "README.md",
+        "LICENSE",
+        "CITATION.cff",
+        "CONTRIBUTING.md",
+        "Makefile",
+        "constraints.txt",
+        "mkdocs.yml",
+    )
     folders = (
         "docs/theory.md",
         "docs/hooks/mathematics.py",
@@ -80,6 +92,37 @@ def test_the_wheel_runs_by_itself(built, tmp_path):
         archive.extractall(tmp_path)
     assert ask(["--version"], tmp_path) == f"paraflex {PROJECT['version']}"
     assert "compare-methods" in ask(["--help"], tmp_path)
+
+
+def test_a_wheel_with_compiled_kernels_compiles_none(tmp_path):
+    compile_all_kernels()
+    shutil.copytree(Path(march.cache_path), tmp_path / "cache" / Path(march.cache_path).name)
+    kernels = {"PARAFLEX_KERNELS": str(tmp_path / "cache")}
+    python("-m", "build", "--no-isolation", "--wheel", "--outdir", tmp_path, ROOT, env=kernels, check=True)
+    (file,) = tmp_path.glob("*.whl")
+    release = f"cp{sys.version_info.major}{sys.version_info.minor}"
+    assert re.fullmatch(rf"{re.escape(NAME)}-{release}-none-\w+\.whl", file.name)
+    assert "py3-none-any" not in file.name
+    with zipfile.ZipFile(file) as archive:
+        archive.extractall(tmp_path / "installed")
+    environment = {"PYTHONPATH": str(tmp_path / "installed"), "NUMBA_CACHE_DIR": str(tmp_path / "empty")}
+    command = ("run", "raparm_i", "--mode", "++++", "--duration", "0.01", "--samples", "5", "--no-figures")
+    done = python("-m", "paraflex", *command, cwd=tmp_path, env=environment, check=True)
+    assert "compiling" not in done.stderr
+    assert not list((tmp_path / "empty").rglob("*.nbc"))
+    # Of another state of the sources none is used.
+    source = tmp_path / "installed" / "paraflex" / "kernel" / "arrays.py"
+    source.write_text(source.read_text(encoding="utf-8") + "# edited\n", encoding="utf-8")
+    look = "from paraflex.compilation import are_compiled; print(are_compiled())"
+    assert python("-c", look, cwd=tmp_path, env=environment, check=True).stdout == "False\n"
+
+
+def test_a_wheel_of_kernels_that_are_not_there_is_refused(tmp_path):
+    kernels = {"PARAFLEX_KERNELS": str(tmp_path)}
+    done = python("-m", "build", "--no-isolation", "--wheel", "--outdir", tmp_path, ROOT, env=kernels)
+    assert done.returncode != 0
+    assert "holds kernels of 0 states; compile into a new folder" in done.stdout + done.stderr
+    assert not list(tmp_path.glob("*.whl"))
 
 
 def test_version_in_the_citation_is_that_of_the_package():

@@ -12,8 +12,6 @@ from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
-from llvmlite import binding
-from numba.core import config
 
 from .dynamics import State, build_system, constant_signals, pack_signals
 from .dynamics.state import check_accelerations
@@ -26,7 +24,8 @@ from .kernel.constraints import add_reactions
 from .kernel.march import march
 from .kernel.notice import LOG, announce_compiling
 from .kernel.packed import make_scratch
-from .kernel.plain import PLAIN, STATE
+from .kernel.plain import PLAIN, STATE, SUPPLIED
+from .kernel.processor import processor
 from .kinematics import Line
 from .mechanism import FlexibleBeam, Geometry, Material, Mechanism, Section, raparm_i
 from .tracking import plan_tracking
@@ -43,7 +42,8 @@ compile_parts(sys.argv[1:])
 
 def are_compiled(geometry: Geometry | str = Geometry.SECOND_ORDER) -> bool:
     """Check whether the kernels for beams of this geometry are in the cache on disk."""
-    return _stamp(as_enum(Geometry, geometry, "geometry")).exists()
+    stamp = _stamp(as_enum(Geometry, geometry, "geometry"))
+    return any((folder / stamp).exists() for folder in (Path(march.cache_path), SUPPLIED))
 
 
 def compile_kernels(
@@ -89,7 +89,7 @@ def _compile(geometries: list[Geometry], announce: Callable[[str], None] | None)
         codes = [process.wait() for process in processes]
         if not any(codes):
             for geometry in missing:
-                _stamp(geometry).touch()
+                (Path(march.cache_path) / _stamp(geometry)).touch()
     finally:
         for process in processes:
             process.kill()
@@ -106,11 +106,10 @@ def _shares(geometries: list[Geometry]) -> list[list[str]]:
     return [parts[0], parts[1][1:]]
 
 
-def _stamp(geometry: Geometry) -> Path:
-    """Return the marker file of a complete compilation, named by Python and processor as the folder may be shared."""
-    processor = (binding.get_process_triple(), binding.get_host_cpu_name(), binding.get_host_cpu_features().flatten())
-    here = repr((sys.version, processor, vars(config)["CPU_NAME"], vars(config)["CPU_FEATURES"], STATE, PLAIN))
-    return Path(march.cache_path) / f"compiled-{geometry.value}-{hashlib.sha256(here.encode()).hexdigest()[:16]}"
+def _stamp(geometry: Geometry) -> str:
+    """Return the name of the marker of a complete compilation, for Python and processor as the folder may be shared."""
+    here = repr((sys.implementation.cache_tag, processor(), STATE, PLAIN))
+    return f"compiled-{geometry.value}-{hashlib.sha256(here.encode()).hexdigest()[:16]}"
 
 
 def _free_beam(geometry: Geometry) -> NativeRun:

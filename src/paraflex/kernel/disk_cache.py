@@ -3,6 +3,9 @@
 Numba checks the file of a cached kernel, not those of the kernels it calls. Therefore each state of all kernels, Numba,
 llvmlite and NumPy has a folder of its own, and code compiled from another state cannot be loaded. Files are pickles of
 machine code, which must not be loaded if damaged: each begins with a digest of the rest.
+
+A wheel may contain compiled kernels, which are used if the cache has none. They are of use for the releases of Numba,
+llvmlite, NumPy and Python that it was built with.
 """
 
 import hashlib
@@ -18,7 +21,8 @@ from numba.core.caching import FunctionCache, IndexDataCacheFile
 
 from ..interrupts import uninterrupted
 from .notice import announce_damage, announce_disk_full
-from .plain import STATE
+from .plain import STATE, SUPPLIED
+from .processor import processor
 
 # Number of states kept: a checkout may be used by several environments, a cache in a home folder by several machines.
 STATES_KEPT = 3
@@ -38,9 +42,13 @@ class _Sealed(IndexDataCacheFile):
         self._seal(self._file(key), (self._source_stamp, key, data))
 
     def load(self, key: Any) -> Any:
-        # The function may have been edited: functions outside paraflex are not part of the state.
-        found = self._unsealed(self._file(key))
-        return found[2] if found is not None and found[:2] == (self._source_stamp, key) else None
+        file = self._file(key)
+        for each in (file, str(SUPPLIED / Path(file).name)):
+            # The function may have been edited: functions outside paraflex are not part of the state.
+            found = self._unsealed(each)
+            if found is not None and found[:2] == (self._source_stamp, key):
+                return found[2]
+        return None
 
     def _file(self, key: Any) -> str:
         return str(Path(self._index_path).with_suffix(f".{_digest(repr(key).encode()).hex()}.nbc"))
@@ -80,13 +88,14 @@ class KernelCache(FunctionCache):
         stamp = self._impl.locator.get_source_stamp()
         self._cache_file = _Sealed(self._cache_path, self._impl.filename_base, stamp)
 
-    def load_overload(self, sig: Any, target_context: Any) -> Any:
-        """Load the code compiled for a signature, without interruption.
+    def _index_key(self, sig: Any, codegen: Any) -> Any:
+        signature, _, function = super()._index_key(sig, codegen)
+        return signature, processor(), function
 
-        Between two of llvmlite's steps code has two owners: an interrupt there would let both delete it.
-        """
+    def _load_overload(self, sig: Any, target_context: Any) -> Any:
+        # Between two of llvmlite's steps code has two owners: an interrupt there would let both delete it.
         with uninterrupted():
-            return super().load_overload(sig, target_context)
+            return super()._load_overload(sig, target_context)
 
     def _save_overload(self, sig: Any, data: Any) -> None:
         try:

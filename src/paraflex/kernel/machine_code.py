@@ -11,8 +11,9 @@ them.
 Plain Numba compares every index with zero, as negative ones count from the end. Kernels use none.
 """
 
-from collections.abc import Callable
-from functools import cache, cached_property
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from functools import cached_property
 from typing import Any
 
 from llvmlite import binding
@@ -25,9 +26,8 @@ from numba.np import arrayobj
 from .disk_cache import KernelCache
 from .notice import announce_compiling
 from .passes import kernel_passes, remembered_signatures
+from .processor import machine
 
-# Optimisation level of LLVM, 0 to 3.
-_LITTLE = 0
 # Beginning of the names that Numba gives to the code of kernels: functions of other packages keep their indices.
 _OF_KERNELS = "_ZN8paraflex6kernel"
 _numbas_index = arrayobj.fix_integer_index
@@ -47,16 +47,32 @@ class _Library(JITCodeLibrary):
     """Code of a function, optimised and made machine code only if Python calls the function."""
 
     called_from_python = True
+    # Optimisation level of LLVM, 0 to 3.
+    level = 3
+
+    def _optimize_functions(self, ll_module: Any) -> None:
+        with _on(self._codegen, machine(self._codegen, self.level)):
+            super()._optimize_functions(ll_module)
 
     def _optimize_final_module(self) -> None:
         if self.called_from_python:
-            super()._optimize_final_module()
+            with _on(self._codegen, machine(self._codegen, self.level)):
+                self._optimise()
+
+    def _optimise(self) -> None:
+        super()._optimize_final_module()
 
     def _finalize_final_module(self) -> None:
         # Code read from the cache is already divided into these two parts.
-        if self._shared_module is None:
-            self._divide()
+        if self._shared_module is not None:
+            super()._finalize_final_module()
+            return
+        self._divide()
+        # Numba's engine makes code for one processor and level, but accepts code made before, as from the cache.
+        code = machine(self._codegen, self.level).emit_object(self._final_module)
+        self._compiled_object = code
         super()._finalize_final_module()
+        self._compiled_object = code
 
     def _divide(self) -> None:
         """Separate the code that other functions copy from the code that becomes machine code."""
@@ -76,27 +92,21 @@ class _Library(JITCodeLibrary):
 class _QuickLibrary(_Library):
     """Code of a function, compiled in less time, but slower."""
 
-    def _optimize_final_module(self) -> None:
-        manager, builder = self._codegen._module_pass_manager(opt=_LITTLE, loop_vectorize=False, slp_vectorize=False)
+    level = 0
+
+    def _optimise(self) -> None:
+        manager, builder = self._codegen._module_pass_manager(opt=0, loop_vectorize=False, slp_vectorize=False)
         manager.run(self._final_module, builder)
 
-    def _finalize_final_module(self) -> None:
-        if self._shared_module is not None:
-            super()._finalize_final_module()
-            return
-        self._divide()
-        # Numba's engine has one optimisation level for all code, but accepts code made before, as from the cache.
-        code = _quick_machine(self._codegen).emit_object(self._final_module)
-        self._compiled_object = code
-        super()._finalize_final_module()
-        self._compiled_object = code
 
-
-@cache
-def _quick_machine(codegen: Any) -> binding.TargetMachine:
-    options: dict[str, Any] = {"opt": _LITTLE}
-    codegen._customize_tm_options(options)
-    return binding.Target.from_triple(binding.get_process_triple()).create_target_machine(**options)
+@contextmanager
+def _on(codegen: Any, other: binding.TargetMachine) -> Iterator[None]:
+    """Let LLVM optimise for another machine within the context; Numba compiles one function at a time."""
+    before, codegen._tm = codegen._tm, other
+    try:
+        yield
+    finally:
+        codegen._tm = before
 
 
 class SeparateCode(CompilerBase):

@@ -50,6 +50,8 @@ def state_of_kernels() -> str:
 # Computed at import: this process does not compile sources that are edited later.
 STATE = state_of_kernels()
 PLAIN = choose(numba.__version__)
+# Folder of compiled kernels of this state in a wheel that has them.
+SUPPLIED = Path(__file__).parent / "compiled" / STATE
 
 
 def compiled(function: Callable[..., Any], *, nogil: bool = False, **options: Any) -> Any:
