@@ -511,6 +511,7 @@ def _joined(driven: Solution, held: Solution, samples: int, multipliers: Array, 
     """
     gained = driven.kinetic_energy[-1] + driven.strain_energy[-1] - driven.kinetic_energy[0] - driven.strain_energy[0]
     before, known = driven.work[-1], {one.place for one in driven.findings}
+    first, then = driven.coordinate_errors, held.coordinate_errors
     arrays = {
         name: np.concatenate([getattr(driven, name)[:samples], getattr(held, name)])
         for name in ("t", "q", "v", "a", "kinetic_energy", "strain_energy")
@@ -530,6 +531,7 @@ def _joined(driven: Solution, held: Solution, samples: int, multipliers: Array, 
         brake_energy=energy,
         # Locked joints have rows that the run does not have.
         multiplier_errors=driven.multiplier_errors,
+        coordinate_errors=None if first is None or then is None else first + then,
         findings=(*driven.findings, *(one for one in held.findings if one.place not in known)),
     )
 

@@ -58,6 +58,10 @@ class Completion:
         q_all[~balanced] = np.nan
         return q_all, v_all, a_all
 
+    def errors(self, few: Array) -> Array:
+        """Return bounds of errors of all coordinates (n,) from those of the coordinates kept."""
+        return np.abs(carried(self.whole, self._few, np.eye(self._few.n)).T) @ few
+
     def _forces(self, q: Array, v: Array, a: Array, multipliers: Array) -> tuple[Array, Array, Array]:
         """Return the forces (k, n) of the bodies' motion and of that with joints, and those of unit inputs."""
         packed, mechanism = self.whole.packed, self.whole.mechanism

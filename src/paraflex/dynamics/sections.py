@@ -118,6 +118,25 @@ class Sections:
         found = self._parts_loads(system, q, v, a, multipliers)
         return np.max([np.max(np.nan_to_num(loads.stress), axis=1) for _, loads in found], axis=0)
 
+    def stress_errors(self, system: System, errors: Array) -> Iterator[tuple[str, float]]:
+        """Yield beams with bounds of the errors of their stresses [Pa], from those of the coordinates (n,).
+
+        A vibration's acceleration is off by its squared frequency times the error of its deflection.
+        """
+        if self.completion is not None:
+            system, errors = self.completion.whole, self.completion.errors(errors)
+        first = 0
+        for part in self.parts:
+            own = slice(first, first := first + len(part.moment))
+            body = system.body(part.body)
+            off = np.concatenate([errors[body.flexible], body.modes.omega**2 * errors[body.flexible]])
+            # Without an acceleration's part, rows have no columns for it.
+            moment, force = (
+                0.0 if rows is None else np.abs(rows[:, : off.size]) @ off[: rows.shape[1]]
+                for rows in (part.moment, part.force)
+            )
+            yield part.body, float(np.max(moment / self.modulus[own] + force / self.area[own]))
+
     def _parts_loads(
         self, system: System, q: Array, v: Array, a: Array, multipliers: Array
     ) -> "Iterator[tuple[_Beam, SectionLoads]]":

@@ -53,7 +53,7 @@ _FOLLOWS = 20.0
 _LEAST, _DIGITS = 1e-12, 64.0
 # Reported error of forces over the sum of the errors of the steps within some cycles. With unresolved vibrations the
 # true errors of the library's mechanisms are 0.3 to 1.5 times the sum.
-_FORCE_SAFETY = 2.0
+_ERROR_SAFETY = 2.0
 # Largest part of a revolution, or of a vibration of the inputs, within a step [rad], by the order of the method (four
 # for higher ones): errors of forces and work are then below a thousandth.
 _PHASES = {1: 0.15, 2: 0.15, 3: 0.4, 4: 0.7}
@@ -185,7 +185,8 @@ class NativeRun:
             constraint_velocity_max=float(state.clock[at.DPHI_MAX]),
             energy_balance_max=float(state.clock[at.BALANCE]),
             passages=state.passages[:, : state.counts[at.PASSAGES]],
-            multiplier_errors=_FORCE_SAFETY * state.forces[at.UNRESOLVED] if estimated else None,
+            multiplier_errors=_ERROR_SAFETY * state.forces[at.UNRESOLVED] if estimated else None,
+            coordinate_errors=_ERROR_SAFETY * state.errors[at.UNRESOLVED] if estimated else None,
         )
 
     def until(self, time: float) -> "NativeRun":

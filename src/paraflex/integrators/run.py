@@ -100,6 +100,7 @@ class Figures:
     energy_balance_max: float
     passages: Array
     multiplier_errors: Array | None = None
+    coordinate_errors: Array | None = None
 
 
 class Run(Protocol):

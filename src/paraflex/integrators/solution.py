@@ -93,6 +93,8 @@ class Solution:
         Estimated errors of multipliers by integration [N, N m]: the sum of the effects of the errors of single steps
         within three cycles, or the whole run if vibrations are undamped, times two. None if the step size is not
         controlled by such errors.
+    coordinate_errors : (n,) array, optional
+        The same of the coordinates [m, rad], from which bounds of the errors of stresses follow.
     brake_energy : float
         Kinetic energy absorbed by brakes as they engaged [J]: `work` is reduced by it from then on.
     findings : sequence of Finding
@@ -128,6 +130,7 @@ class Solution:
     evaluations: int = 0
     event: str = ""
     multiplier_errors: Array | None = None
+    coordinate_errors: Array | None = None
     brake_energy: float = 0.0
     findings: Sequence[Finding] = ()
     resting: bool = False

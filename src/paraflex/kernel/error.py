@@ -87,6 +87,7 @@ def filtered_error(system, g, gains, march, work, slow):
         march.forces[at.LOCAL, r] = abs(work.mu[r]) / g
     for j in range(march.q.size):
         march.eq[j] += g * work.x[j]
+        march.errors[at.LOCAL, j] = abs(march.eq[j])
     position = mass_norm(system, work, march.eq)
     if march.counts[at.STEPS] % SLOW_AGE == 0:
         note_friction(system, march.q, march.v, slow.mu, slow.compliance)
@@ -141,8 +142,8 @@ def allowed_part(controls, h, march):
 
 
 @routine
-def note_forces(controls, h, march):
-    """Record the largest multipliers, and their changes by local errors within some cycles."""
+def note_errors(controls, h, march):
+    """Record the largest multipliers, and changes of them and of the coordinates by local errors within some cycles."""
     forgotten = exp(-h / (controls.force_cycles * march.clock[at.CYCLE]))
     for r in range(march.guess_lam.size):
         march.forces[at.PEAK, r] = max(march.forces[at.PEAK, r], abs(march.stage_lam[1, 0, r]))
@@ -150,6 +151,9 @@ def note_forces(controls, h, march):
             march.forces[at.RECENT, r] = forgotten * march.forces[at.RECENT, r] + march.forces[at.LOCAL, r]
             unresolved = max(march.forces[at.RECENT, r], LOST_SHARE * march.forces[at.LOST, r])
             march.forces[at.UNRESOLVED, r] = max(march.forces[at.UNRESOLVED, r], unresolved)
+    for j in range(march.q.size):
+        march.errors[at.RECENT, j] = forgotten * march.errors[at.RECENT, j] + march.errors[at.LOCAL, j]
+        march.errors[at.UNRESOLVED, j] = max(march.errors[at.UNRESOLVED, j], march.errors[at.RECENT, j])
 
 
 @routine

@@ -7,7 +7,7 @@ from .arrays import copy, fill, last_before
 from .bodies import stored_energy
 from .compiling import kernel, releases_lock, routine
 from .constraints import constraint_values, note_friction
-from .error import note_forces
+from .error import note_errors
 from .factor import factor_bodies
 from .linear import SINGULAR_PART, orient
 from .metric import mass_norm
@@ -214,7 +214,7 @@ def accept(system, signals, tableau, controls, t, h, march, work, out, aside):
     march.counts[at.DRIFTED] = march.counts[at.HELD_END]
     if march.counts[at.NEAR] == 0:
         march.counts[at.PREPARED] = 0
-    note_forces(controls, h, march)
+    note_errors(controls, h, march)
     note_cycle(system, controls, march)
     kinetic, strain, weight = stored_energy(system, march.q, march.v, march.stage_lam[1, 0], work.scratch)
     done = march.clock[at.WORK] + weight - march.clock[at.WEIGHT_0]

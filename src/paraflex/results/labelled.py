@@ -52,6 +52,7 @@ UNITS = (
         "tip_transverse": ("transverse tip displacement", "m"),
         "tip_slope": ("tip slope", "rad"),
         "point_position": ("position of a named point", "m"),
+        "stress_max_error": ("how far the largest stress of a beam may be off by errors of integration", "Pa"),
         "joint_force_error": ("how far the force of a joint may be off by errors of integration", "N"),
         "joint_moment_error": ("how far the moment of a joint may be off by errors of integration", "N m"),
         "drive_torque_error": ("how far the torque of a prescribed motion may be off by errors of integration", "N m"),
@@ -142,11 +143,13 @@ _TORQUES = ("torque", "internal_torque", "peak_torque", "rms_torque", "applied_t
 
 
 def error_variables(links: Links) -> Variables:
-    """Return bounds of the integration errors of joint and drive loads in a run; empty if they are unknown."""
+    """Return bounds of the integration errors of stresses and loads in a run; empty if they are unknown."""
     if links.load_errors is None:
         return {}
     force, moment, drive = links.load_errors
     out: Variables = {"joint_force_error": (("joint",), force), "joint_moment_error": (("joint",), moment)}
+    if links.stress_errors is not None:
+        out["stress_max_error"] = (("body",), links.stress_errors)
     return out | ({"drive_torque_error": (("drive",), drive)} if drive.size else {})
 
 

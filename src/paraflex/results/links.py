@@ -23,7 +23,7 @@ from .drawing import drawing_variables, system_drawing
 from .numbers import single, stacked
 from .outlines import chord_deflections
 from .sensors import READING, SENSOR
-from .stress import Variables, section_result, section_variables
+from .stress import Variables, section_result, section_variables, stress_errors
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -47,12 +47,15 @@ class Links:
         forces and readings of sensors.
     load_errors : LoadComponents, optional
         Bounds of the integration errors of joint and drive loads; None if unknown.
+    stress_errors : (bodies,) array, optional
+        Bounds of the integration errors of stresses [Pa]; None if unknown, or without section forces.
     sections : Sections, optional
         Sections of the beams; None for models without shape functions, and without flexible beams.
     """
 
     variables: Variables
     load_errors: LoadComponents | None = None
+    stress_errors: Array | None = None
     sections: Sections | None = None
 
     def __getitem__(self, name: str) -> NDArray[np.floating]:
@@ -88,7 +91,8 @@ def system_links(system: System, solution: Solution, torques: Array, samples: in
     drawn = system_drawing(system, q)
     frame = frame_load(system, drawn.joints, loads, q, v)
     drives, sensors = mechanism.prescribed, [one.name for one in mechanism.sensors]
-    found = section_result(system, q, v, a, multipliers)
+    found, off = section_result(system, q, v, a, multipliers), solution.coordinate_errors
+    bodies = [body.name for body in mechanism.bodies]
     variables: Variables = {
         "angle": (("body",), q[:, first]),
         "angular_velocity": (("body",), v[:, first]),
@@ -117,10 +121,11 @@ def system_links(system: System, solution: Solution, torques: Array, samples: in
         given = [one.name for one in system.mechanism.sensors]
         variables[READING] = ((SENSOR,), _by_name(readings, given, sensors))
     if found is not None:
-        variables |= section_variables(found, [body.name for body in mechanism.bodies])
+        variables |= section_variables(found, bodies)
     return Links(
         variables=variables,
         load_errors=None if errors is None else load_errors(system, joints, errors),
+        stress_errors=None if off is None or found is None else stress_errors(system, off, bodies),
         sections=None if found is None else found.sections,
     )
 

@@ -17,15 +17,14 @@ Figures = dict[str, float | str | None]
 OF_BEAMS = ("stress_max", "stress_place", "stress_time", "bending_stress_max", "axial_stress_max", "safety_factor")
 # Variables of joints; those of vectors may have an error.
 _OF_JOINTS = ("joint_coordinate", "joint_speed", "joint_force", "joint_moment")
-_NAMES = {"stress_place": "place", "stress_time": "time"}
+_NAMES = {"stress_place": "place", "stress_time": "time", "stress_max_error": "stress_error"}
 
 
 def load_figures(run: xr.Dataset) -> dict[str, Any]:
     """Return the largest magnitudes of loads of one run.
 
     Values that a model does not give are None, and groups that the results do not hold are missing. A run that failed
-    has no loads, as its largest ones may be artefacts of the failure. The relative error of stresses is taken to be the
-    larger one of the forces.
+    has no loads, as its largest ones may be artefacts of the failure.
 
     Returns
     -------
@@ -43,8 +42,9 @@ def load_figures(run: xr.Dataset) -> dict[str, Any]:
         return out
     if "stress_max" in run:
         bent = set(map(str, run["section_body"].values))
+        kept = (*OF_BEAMS, *(["stress_max_error"] if "stress_max_error" in run else []))
         out["beams"] = {
-            body: {_NAMES.get(name, name): finite_or_none(run[name].values[b]) for name in OF_BEAMS}
+            body: {_NAMES.get(name, name): finite_or_none(run[name].values[b]) for name in kept}
             for b, body in enumerate(map(str, run["body"].values))
             if body in bent or np.isfinite(run["stress_max"].values[b])
         }
@@ -70,9 +70,6 @@ def load_figures(run: xr.Dataset) -> dict[str, Any]:
                 }
                 for name, unit in zip(run[dim].values, _units(run[torque], run.sizes[dim]), strict=True)
             }
-    if (part := _uncertain(out)) is not None:
-        for one in out.get("beams", {}).values():
-            one["stress_error"] = None if one["stress_max"] is None else part * one["stress_max"]
     if "frame_force" in run:
         out["frame"] = _most("force", run, "frame_force") | _most("moment", run, "frame_moment")
     return out
@@ -95,18 +92,6 @@ def _most(name: str, run: xr.Dataset, variable: str, place: Mapping[str, str] | 
     known = f"{variable}_error" in run
     error = {f"{name}_error": finite_or_none(run[f"{variable}_error"].sel(place).item())} if known else {}
     return {f"{name}_max": most, f"{name}_time": when, **error}
-
-
-def _uncertain(found: Mapping[str, Mapping[str, Mapping[str, Any]]]) -> float | None:
-    """Return the larger relative error of joint forces and drive efforts, each relative to its largest value."""
-    parts = []
-    for group, load in (("joints", "force"), ("drives", "torque")):
-        most, error = (
-            max((one.get(f"{load}_{kind}") or 0.0 for one in found.get(group, {}).values()), default=0.0)
-            for kind in ("max", "error")
-        )
-        parts += [error / most] if error and most else []
-    return max(parts, default=None)
 
 
 def resolved_error(figures: Mapping[str, Any], load: str) -> float | None:

@@ -71,6 +71,15 @@ def section_result(system: System, q: Array, v: Array, a: Array, multipliers: Ar
     return SectionResult(replace(sections, bodies=owners, x=sections.x + starts), loads._replace(x=x))
 
 
+def stress_errors(system: System, errors: Array, bodies: list[str]) -> Array:
+    """Return bounds of the errors of stresses (bodies,) [Pa], NaN without stresses, from those of coordinates (n,)."""
+    out, sections = np.full(len(bodies), np.nan), sections_of(system)
+    for name, error in () if sections is None else sections.stress_errors(system, errors):
+        b = bodies.index(system.carrier(name)[0])
+        out[b] = np.fmax(out[b], error)
+    return out
+
+
 def section_variables(found: SectionResult, bodies: list[str]) -> Variables:
     """Return the variables over time: section forces in single precision, stresses, and forces under contacts."""
     stress, number = found.loads.stress, len(found.sections.bodies)
