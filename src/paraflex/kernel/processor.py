@@ -35,7 +35,7 @@ def processor() -> tuple[str, ...]:
 
 
 @cache
-def machine(codegen: Any, level: int) -> binding.TargetMachine:
+def machine(codegen: Any, level: int) -> Any:
     """Return what makes machine code, at an optimisation level of LLVM from 0 to 3."""
     options: dict[str, Any] = {"opt": level}
     codegen._customize_tm_options(options)

@@ -34,11 +34,12 @@ import scipy
 from scipy.sparse import csr_matrix as Sparse
 
 from paraflex.arrays import Array, Mask
-from paraflex.dynamics import System, acting_loads, joint_coordinate
+from paraflex.dynamics import System, acting_loads, inputs_of, joint_coordinate, still_signals
 from paraflex.dynamics.linearise import DENSE_COORDINATES, all_modes, typical_square
 from paraflex.dynamics.points import marker_place
 from paraflex.dynamics.sparse import Saddle, elastic_stiffness, sparse_jacobian, sparse_mass, stiffness_diagonal
 from paraflex.dynamics.tangents import MotionPoint, Tangency
+from paraflex.integrators.run import jump_times
 from paraflex.kernel.bodies import motion_forces
 from paraflex.kernel.packed import make_scratch
 from paraflex.mechanism import ActuationMode, Mechanism
@@ -196,9 +197,9 @@ def _vibrating(times: Array, forces: Array, omega: Array, jumping: Mask) -> Arra
 
 def _jumping(mechanism: Mechanism, times: Array) -> Mask:
     """Return which intervals between times (k - 1,) hold a jump of a load, or end with one."""
-    knots = np.array([knot for load in mechanism.loads for profile in load.profiles for knot in profile.knots])
-    jumps = np.any(acting_loads(mechanism, knots) != acting_loads(mechanism, knots, before=True), axis=1)
-    return np.isin(np.arange(1, times.size), np.searchsorted(times, knots[jumps]))
+    signals, knots = still_signals(mechanism, float(times[-1]))
+    jumps = jump_times(signals, inputs_of(mechanism), np.array(knots))
+    return np.isin(np.arange(1, times.size), np.searchsorted(times, jumps))
 
 
 class Loading(NamedTuple):
