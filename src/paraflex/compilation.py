@@ -42,8 +42,8 @@ compile_parts(sys.argv[1:])
 
 def are_compiled(geometry: Geometry | str = Geometry.SECOND_ORDER) -> bool:
     """Check whether the kernels for beams of this geometry are in the cache on disk."""
-    stamp = _stamp(as_enum(Geometry, geometry, "geometry"))
-    return any((folder / stamp).exists() for folder in (Path(march.cache_path), SUPPLIED))
+    given = as_enum(Geometry, geometry, "geometry")
+    return _stamp(given).exists() or _stamp(given, SUPPLIED).exists()
 
 
 def compile_kernels(
@@ -89,7 +89,7 @@ def _compile(geometries: list[Geometry], announce: Callable[[str], None] | None)
         codes = [process.wait() for process in processes]
         if not any(codes):
             for geometry in missing:
-                (Path(march.cache_path) / _stamp(geometry)).touch()
+                _stamp(geometry).touch()
     finally:
         for process in processes:
             process.kill()
@@ -106,10 +106,11 @@ def _shares(geometries: list[Geometry]) -> list[list[str]]:
     return [parts[0], parts[1][1:]]
 
 
-def _stamp(geometry: Geometry) -> str:
-    """Return the name of the marker of a complete compilation, for Python and processor as the folder may be shared."""
+def _stamp(geometry: Geometry, folder: Path | None = None) -> Path:
+    """Return the marker of a complete compilation, by default in the cache, named by what may differ in a folder."""
     here = repr((sys.implementation.cache_tag, processor(), STATE, PLAIN))
-    return f"compiled-{geometry.value}-{hashlib.sha256(here.encode()).hexdigest()[:16]}"
+    name = f"compiled-{geometry.value}-{hashlib.sha256(here.encode()).hexdigest()[:16]}"
+    return (folder or Path(march.cache_path)) / name
 
 
 def _free_beam(geometry: Geometry) -> NativeRun:
