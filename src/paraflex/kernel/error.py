@@ -103,14 +103,15 @@ def filtered_error(system, g, gains, march, work, slow):
 
 @routine
 def note_lost_vibrations(system, controls, h, g, march, work):
-    """Record the multipliers of undamped vibrations lost in a step that is much longer than the last one.
+    """Record multipliers and deflections of undamped vibrations lost in a step that is much longer than the last one.
 
     A vibration with acceleration A phi, (K - omega^2 M) phi + Phi_q^T nu = 0, has multipliers A nu / omega^2. Filtering
     its acceleration gives g^2 A nu / (1 + g^2 omega^2): all of them if it is much faster than the step, zero for
-    motions without deflection. Filtering twice leaves out vibrations that are resolved. The stages of the last step
-    have all phases.
+    motions without deflection. Filtering twice leaves out vibrations that are resolved, and gives g^2 omega^2 A phi /
+    (1 + g^2 omega^2)^2, which is the deflection A phi / omega^2 over g^2. The stages of the last step have all phases.
     """
     fill(march.forces[at.LOST], 0.0)
+    fill(march.errors[at.LOST], 0.0)
     if not isinf(controls.force_cycles) or h < GROWN * march.clock[at.LAST_STEP]:
         return
     fill(march.eq, 0.0)
@@ -122,6 +123,8 @@ def note_lost_vibrations(system, controls, h, g, march, work):
         filter_error(system, g, UNCHANGED, march.eq, march.ev, work)
         for r in range(work.mu.size):
             march.forces[at.LOST, r] = max(march.forces[at.LOST, r], abs(work.mu[r]))
+        for j in range(march.ev.size):
+            march.errors[at.LOST, j] = max(march.errors[at.LOST, j], g * g * abs(work.x[j]))
 
 
 @routine
@@ -153,7 +156,8 @@ def note_errors(controls, h, march):
             march.forces[at.UNRESOLVED, r] = max(march.forces[at.UNRESOLVED, r], unresolved)
     for j in range(march.q.size):
         march.errors[at.RECENT, j] = forgotten * march.errors[at.RECENT, j] + march.errors[at.LOCAL, j]
-        march.errors[at.UNRESOLVED, j] = max(march.errors[at.UNRESOLVED, j], march.errors[at.RECENT, j])
+        unresolved = max(march.errors[at.RECENT, j], LOST_SHARE * march.errors[at.LOST, j])
+        march.errors[at.UNRESOLVED, j] = max(march.errors[at.UNRESOLVED, j], unresolved)
 
 
 @routine

@@ -20,7 +20,7 @@ CYCLE, FASTEST, MEMORY = 21, 22, 23
 # Change of forces at the last sample solved, as a part of the largest force.
 SAMPLE_CHANGE = 24
 # Rows of March.forces: the largest multipliers; their changes by local errors in the last step, in the last cycles, and
-# the largest such change so far; vibrations lost in the last step. March.errors has the changes of coordinates.
+# the largest such change so far; vibrations lost in the last step. March.errors has those of coordinates.
 PEAK, LOCAL, RECENT, UNRESOLVED, LOST = range(5)
 # Indices of March.counts.
 STEPS, REJECTED, ITERATIONS, FACTORS, SAMPLE, STOP, FAILURES, PASSAGES = range(8)

@@ -89,7 +89,7 @@ class March(NamedTuple):
     eq: Annotated[Floats, "n"]  # estimated error of q in a step
     ev: Annotated[Floats, "n"]  # estimated error of v in a step
     forces: Annotated[Floats, 5, "m"]  # sizes and errors of multipliers, see `kernel.indices`
-    errors: Annotated[Floats, 4, "n"]  # errors of coordinates, rows as in `forces`
+    errors: Annotated[Floats, 5, "n"]  # errors of coordinates, rows as in `forces`
     guess_lam: Annotated[Floats, "m"]  # multipliers of a sample before the equations of motion are solved there
     torques: Annotated[Floats, "acting"]  # motor torques or forces at a stage, then those of time-dependent loads
     algorithmic: Annotated[Floats, 2, "n"]  # algorithmic accelerations of the Newmark family, last and this step
