@@ -15,7 +15,7 @@ from shell import paraflex
 
 METRICS = ["drive_torque_max", "drive_power_max", "joint_force_max", "joint_speed_max", "stress_max",
            "safety_factor_min", "section_moment_max", "strain_energy_max", "drive_torque_error",
-           "joint_force_error"]  # fmt: skip
+           "joint_force_error", "stress_max_error"]  # fmt: skip
 # A slider-crank that a constant speed drives, without the library's published start.
 LIBRARY = Path(pf.__file__).parent / "mechanism" / "library" / "slider_crank_flexible.toml"
 MODEL = re.sub(r"(?ms)^# The published start.*?(?=^\[study\])", "", LIBRARY.read_text(encoding="utf-8"))
@@ -76,6 +76,7 @@ def test_rows_are_what_runs_of_each_design_say(swept):
             "strain_energy_max": data["strain_energy"].max(),
             "drive_torque_error.drive": data["drive_torque_error"].max(),
             "joint_force_error": data["joint_force_error"].max(),
+            "stress_max_error": data["stress_max_error"].max(),
             **{f"joint_speed_max.{joint}": speeds.sel(joint=joint) for joint in data["joint"].values},
         }
         for column, value in expected.items():

@@ -486,6 +486,7 @@ def test_the_error_of_the_mechanism_s_study_comes_first(error, first):
     others = {
         "drive_torque_error",
         "joint_force_error",
+        "stress_max_error",
         "joint_force_max",
         "joint_speed_max",
         "settling_time",

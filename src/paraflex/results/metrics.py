@@ -359,6 +359,8 @@ _ALL = (
     Metric("joint_force_error", "error of integration of the force in any joint, at most", "N",
            _absolute(lambda x: np.max(x.load_errors.force, initial=0.0)), "error of the joint force", smooth=False,
            kept_of=()),
+    Metric("stress_max_error", "error of integration of the stress in any beam, at most", "Pa",
+           _absolute(lambda x: x.stress_error), "error of the stress", smooth=False, kept_of=()),
     Metric("joint_speed_max", "largest magnitude of the rate of each joint's angle or travel", "rad/s",
            _largest_of_each(lambda x: x.joint_speed), "largest speed", each=JOINT, kept_of=()),
     Metric("strain_energy_max", "largest strain energy", "J",

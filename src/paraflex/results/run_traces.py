@@ -12,6 +12,7 @@ from paraflex.control.loop.run_loop import ControllerRecord
 from paraflex.control.loop.runs import ControlledMotion, ControlledTracking
 from paraflex.dynamics import System, joint_coordinate
 from paraflex.dynamics.joint_loads import LoadComponents, drive_torques, joint_loads, load_errors, undetermined_loads
+from paraflex.dynamics.sections import sections_of
 from paraflex.equilibria.conditions import Coordinate
 from paraflex.equilibria.result import Statics
 from paraflex.integrators import Solution
@@ -90,6 +91,13 @@ class SolutionTraces(Generic[R]):
         """Bounds of the integration errors of joint and drive loads; NaN if unknown."""
         errors = self.solution.multiplier_errors
         return load_errors(self.system, self._joints, np.full(self.system.m, np.nan) if errors is None else errors)
+
+    @property
+    def stress_error(self) -> float:
+        """Bound of the integration errors of stresses [Pa]; NaN if unknown."""
+        errors, sections = self.solution.coordinate_errors, sections_of(self.system)
+        known = () if errors is None or sections is None else sections.stress_errors(self.system, errors)
+        return max((error for _, error in known), default=np.nan)
 
     @cached_property
     def joint_speed(self) -> Trace:
