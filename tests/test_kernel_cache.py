@@ -13,6 +13,7 @@ from numba.core import config
 
 import paraflex
 import processes
+from paraflex import cache_folder
 from paraflex.kernel import disk_cache, notice, processor
 from paraflex.kernel.compiling import Kernel
 
@@ -237,3 +238,22 @@ def test_processors_of_a_level_share_kernels_and_others_have_their_own(monkeypat
         each.cache_clear()
     assert found[0] == found[1] == (binding.get_process_triple(), "x86-64-v3")
     assert found[2][1:] == ("nehalem", "+sse4.2")
+
+
+def test_a_kernel_that_cannot_be_read_is_not_there(tmp_path):
+    cache = disk_cache.KernelCache(python)
+    (tmp_path / "kernel.nbc").mkdir()
+    assert cache._cache_file._unsealed(str(tmp_path / "kernel.nbc")) is None
+
+
+def test_a_cache_folder_that_cannot_be_reached_is_not_used(tmp_path, monkeypatch):
+    def barred(_):
+        raise PermissionError(errno.EACCES, "Permission denied")
+
+    environment = {cache_folder.VARIABLE: str(tmp_path / "x"), "HOME": str(tmp_path)}
+    said = []
+    monkeypatch.setattr(cache_folder, "_warn", said.append)
+    monkeypatch.setattr(Path, "exists", barred)
+    cache_folder.ensure_cache_folder(tmp_path, environment)
+    assert environment[cache_folder.VARIABLE] != str(tmp_path / "x")
+    assert "cannot be written: compiled kernels are kept elsewhere" in said[0]

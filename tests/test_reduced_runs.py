@@ -558,3 +558,34 @@ def test_completed_motions(task, full):
         np.testing.assert_allclose(part, same_part, atol=1e-6 * np.abs(part).max())
     hardest = np.argmax(np.max(np.abs(few[3]), axis=1))
     assert np.isnan(complete(*few[:3], 1.1 * few[3])[0][hardest]).all()
+
+
+def test_stresses_of_bodies_without_coordinates_have_no_bound_of_errors():
+    task = pf.plan(pf.load("geared_five_bar"), next(iter(pf.load("geared_five_bar").paths)), samples=51)
+    run = task.remodelled(pf.reduced_mechanism(task, 4, modes=["++"])).simulate("++", warning=False)
+    error = pf.tracking_dataset([run]).isel(mode=0)["stress_max_error"]
+    kept = {name: len(rows[0]) for name, rows in run.task.mechanism.bases.items()}
+    assert 0 in kept.values()
+    for name, count in kept.items():
+        assert np.isfinite(error.sel(body=name).item()) == (count > 0)
+
+
+def test_rows_close_to_one_another_are_a_jump_and_slow_ramps_are_none():
+    model = pf.load("five_bar")
+
+    def task(rise, samples=101):
+        force = pf.TabulatedProfile((0.0, 0.2, 0.2 + rise, 1.0), (0.0, 0.0, 20.0, 20.0), "linear")
+        push = pf.PointForce("push", pf.PointRef("distal1", "C"), (force, 0.0))
+        return pf.plan(replace(model.mechanism, loads=(push,)), model.paths["square"], duration=0.5, samples=samples)
+
+    kept = []
+    for rise, steep in ((2e-5, True), (1e-2, False)):
+        chosen = pf.planned_reduction(task(rise), 1e-4)
+        few = task(rise).remodelled(chosen.mechanism)
+        kept.append(few.system.n_flexible)
+        assert ("reduced-jumps" in codes(pf.run_study(few, ["++"], reduction=chosen, warning=False).data)) == steep
+    assert kept[0] > kept[1]
+    # Between few samples it is not taken for a slow change.
+    other = task(2e-5, 51)
+    few = other.remodelled(pf.planned_reduction(other, 1e-4).mechanism)
+    assert few.system.n_flexible > kept[1]

@@ -43,8 +43,11 @@ def _users(environment: MutableMapping[str, str]) -> Path:
 
 def _can_write(folder: Path) -> bool:
     """Check whether files can be created in a folder, or the folder itself can be created."""
-    existing = next((place for place in (folder, *folder.parents) if place.exists()), None)
-    return existing is not None and existing.is_dir() and os.access(existing, os.W_OK | os.X_OK)
+    try:
+        existing = next((place for place in (folder, *folder.parents) if place.exists()), None)
+        return existing is not None and existing.is_dir() and os.access(existing, os.W_OK | os.X_OK)
+    except PermissionError:
+        return False
 
 
 def _warn(text: str) -> None:

@@ -67,7 +67,7 @@ def run_motion(request: RunRequest, model: Model, mechanism: Mechanism, options:
         raise InputError(
             "as few coordinates as the tolerance allows are chosen from a planned path, and there is none",
             field="study.reduced" if request.reduced is None else "--reduced", value=AUTO,
-            remedy="give a number, or leave it out",
+            remedy="leave it out, or give a number where beams are flexible",
         )  # fmt: skip
     with hold_results(request.out, RUN, force=request.force) as folder:
         console, model = PlainConsole(stderr=True), replace(model, study=study)

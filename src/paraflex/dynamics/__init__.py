@@ -37,6 +37,7 @@ from .signals import (
     pack_signals as pack_signals,
     piecewise_quintic as piecewise_quintic,
     profile_signal as profile_signal,
+    steep_times as steep_times,
     still_signals as still_signals,
 )
 from .singularity import SingularityMeasure as SingularityMeasure

@@ -59,8 +59,12 @@ class Completion:
         return q_all, v_all, a_all
 
     def errors(self, few: Array) -> Array:
-        """Return bounds of errors of all coordinates (n,) from those of the coordinates kept."""
-        return np.abs(carried(self.whole, self._few, np.eye(self._few.n)).T) @ few
+        """Return bounds of errors of all coordinates (n,), NaN for bodies without any, from those of the ones kept."""
+        found = np.abs(carried(self.whole, self._few, np.eye(self._few.n)).T) @ few
+        for body, kept in zip(self.whole.bodies, self._few.bodies, strict=True):
+            if not kept.nf:
+                found[body.flexible] = np.nan
+        return found
 
     def _forces(self, q: Array, v: Array, a: Array, multipliers: Array) -> tuple[Array, Array, Array]:
         """Return the forces (k, n) of the bodies' motion and of that with joints, and those of unit inputs."""

@@ -20,6 +20,8 @@ _NEAR_PROFILE, _NEARLY_PROFILE, _FALLING = 1e-10, 1e-3, 0.25
 # Rounding error of cancelling terms of a prescribed motion [rad or m]; relative to values above one.
 LEFT = 2e-14
 _SHORTEST_PIECE = 1e-6
+# Changes of loads within this time excite vibrations as jumps do [s].
+_RISE = 1e-3
 _DEGREE = 5
 
 
@@ -201,6 +203,17 @@ def acting_loads(mechanism: Mechanism, t: Array, *, before: bool = False) -> Arr
     for k, (place, profile) in zip(inputs.loads, _profiles(mechanism), strict=False):
         acting[:, k] = _evaluate(place, profile, at)[0]
     return acting
+
+
+def steep_times(mechanism: Mechanism, end: float) -> Array:
+    """Return the knots (j,) after which a load changes by half its size or more within a millisecond [s].
+
+    Rows of a table that are close to one another stand for a jump.
+    """
+    knots = np.unique([k for load in mechanism.loads for each in load.profiles for k in each.knots if 0.0 < k < end])
+    before, after = acting_loads(mechanism, knots, before=True), acting_loads(mechanism, np.minimum(knots + _RISE, end))
+    size = np.max(np.abs([before, after]), axis=(0, 1), initial=0.0)
+    return knots[np.any((np.abs(after - before) >= 0.5 * size) & (size > 0.0), axis=1)]
 
 
 def _profiles(mechanism: Mechanism) -> Iterator[tuple[str, TimeProfile]]:

@@ -10,7 +10,7 @@ import numpy as np
 
 from paraflex.arguments import checked_arguments
 from paraflex.arrays import Array
-from paraflex.dynamics import State, System, dependence
+from paraflex.dynamics import State, System, dependence, steep_times
 from paraflex.dynamics.change_points import dependent_drives
 from paraflex.dynamics.system import DENSE_ROWS
 from paraflex.errors import ConstraintDriftError, IntegrationError, Moment, SingularPositionError, SliderOffBeamError
@@ -274,7 +274,7 @@ class Integration:
         solution = whole if self._between is None else self._between.kept(whole)
         known = (*self._ends.findings(solution.q), *filter(None, [self._loose]))
         mesh, samples, kept = elements_too_few(system, run.problem.limits), self._samples, solution
-        known += tuple(_excited_beyond_shapes(system, run.problem.jumps[run.problem.jumps < run.time]))
+        known += tuple(_excited_beyond_shapes(run))
 
         def findings() -> Iterator[Finding]:
             # Loads between samples take as long to compute as a tenth of a run, and studies of many runs rarely ask.
@@ -337,14 +337,19 @@ class Integration:
         return error(cause, moment, solution, remedy)
 
 
-def _excited_beyond_shapes(system: System, jumps: Array) -> Iterator[Finding]:
-    """Yield a finding if inputs jumped at some times, which also excites the shapes that reduced bodies lack."""
-    if jumps.size and system.mechanism.bases:
+def _excited_beyond_shapes(run: Run) -> Iterator[Finding]:
+    """Yield a finding if inputs jumped in a run, which also excites the shapes that reduced bodies lack."""
+    mechanism = run.problem.system.mechanism
+    if not mechanism.bases:
+        return
+    jumps = np.sort([*run.problem.jumps[run.problem.jumps < run.time], *steep_times(mechanism, run.time)])
+    if jumps.size:
         yield Finding(
             "reduced-jumps",
             "study.reduced",
-            f"torques, loads or prescribed motions jump, first at t = {jumps[0]:.4g} s: of the vibrations that follow, "
-            "the shapes kept hold those that move the end-effector, and joint forces and stresses need more",
+            f"torques, loads or prescribed motions jump or rise steeply, first at t = {jumps[0]:.4g} s: of the "
+            "vibrations that follow, the shapes kept hold those that move the end-effector, and joint forces and "
+            "stresses need more",
             "keep all flexible coordinates for these, or let jumps rise over some milliseconds",
         )
 

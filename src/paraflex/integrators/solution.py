@@ -94,7 +94,8 @@ class Solution:
         within three cycles, or the whole run if vibrations are undamped, times two. None if the step size is not
         controlled by such errors.
     coordinate_errors : (n,) array, optional
-        The same of the coordinates [m, rad], from which bounds of the errors of stresses follow.
+        The same of the coordinates [m, rad], always over the whole run, from which bounds of the errors of stresses
+        follow.
     brake_energy : float
         Kinetic energy absorbed by brakes as they engaged [J]: `work` is reduced by it from then on.
     findings : sequence of Finding

@@ -59,10 +59,10 @@ class _Sealed(IndexDataCacheFile):
             opened.write(_digest(content) + content)
 
     def _unsealed(self, file: str) -> Any:
-        """Return the content of a file, or None; a damaged file is removed."""
+        """Return the content of a file, or None if it cannot be read; a damaged file is removed."""
         try:
             content = Path(file).read_bytes()
-        except FileNotFoundError:
+        except OSError:
             return None
         size = len(_digest(b""))
         if content[:size] == _digest(content[size:]):

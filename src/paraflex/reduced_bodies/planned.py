@@ -34,7 +34,7 @@ import scipy
 from scipy.sparse import csr_matrix as Sparse
 
 from paraflex.arrays import Array, Mask
-from paraflex.dynamics import System, acting_loads, inputs_of, joint_coordinate, still_signals
+from paraflex.dynamics import System, acting_loads, inputs_of, joint_coordinate, steep_times, still_signals
 from paraflex.dynamics.linearise import DENSE_COORDINATES, all_modes, typical_square
 from paraflex.dynamics.points import marker_place
 from paraflex.dynamics.sparse import Saddle, elastic_stiffness, sparse_jacobian, sparse_mass, stiffness_diagonal
@@ -196,10 +196,12 @@ def _vibrating(times: Array, forces: Array, omega: Array, jumping: Mask) -> Arra
 
 
 def _jumping(mechanism: Mechanism, times: Array) -> Mask:
-    """Return which intervals between times (k - 1,) hold a jump of a load, or end with one."""
+    """Return which intervals between times (k - 1,) hold a jump of a load or end with one, or hold a steep rise."""
     signals, knots = still_signals(mechanism, float(times[-1]))
     jumps = jump_times(signals, inputs_of(mechanism), np.array(knots))
-    return np.isin(np.arange(1, times.size), np.searchsorted(times, jumps))
+    rises = np.setdiff1d(steep_times(mechanism, float(times[-1])), jumps)
+    ends = [*np.searchsorted(times, jumps), *np.searchsorted(times, rises, side="right")]
+    return np.isin(np.arange(1, times.size), ends)
 
 
 class Loading(NamedTuple):

@@ -97,7 +97,7 @@ class SolutionTraces(Generic[R]):
         """Bound of the integration errors of stresses [Pa]; NaN if unknown."""
         errors, sections = self.solution.coordinate_errors, sections_of(self.system)
         known = () if errors is None or sections is None else sections.stress_errors(self.system, errors)
-        return max((error for _, error in known), default=np.nan)
+        return float(np.fmax.reduce([error for _, error in known], initial=np.nan))
 
     @cached_property
     def joint_speed(self) -> Trace:
