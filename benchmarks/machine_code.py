@@ -18,7 +18,7 @@ from llvmlite import binding
 
 from paraflex.kernel.processor import processor
 
-RUNS = {"fixed steps": "step=1 / 500", "error control": "tolerance=1e-5"}
+RUNS = {"fixed steps": {"step": 2e-3}, "error control": {"tolerance": 1e-5}}
 SCRIPT = """
 import json, time
 import paraflex as pf
@@ -26,7 +26,7 @@ model = pf.load("raparm_i")
 task = pf.plan(model.mechanism.with_geometry("second-order"), model.paths["square"])
 found = {{}}
 for name, options in {runs}.items():
-    options, times = eval(f"pf.IntegrationOptions(method='esdirk5', {{options}})"), []
+    options, times = pf.IntegrationOptions(method="esdirk5", **options), []
     for _ in range(6):
         began = time.process_time()
         task.simulate("++++", options=options, warning=False)

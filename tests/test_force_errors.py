@@ -189,8 +189,8 @@ def test_stresses_of_vibrations_that_growing_steps_lose_are_within_their_bounds(
         return pf.motion_dataset(pf.simulate_motion(mechanism, duration, samples=201, options=chosen, warning=False))
 
     usual, fine = run(method=method), run(step=duration / 5000)["stress_max"].values
-    bent = np.isfinite(fine) & (fine > 0.1 * np.nanmax(fine))
-    bound, off = usual["stress_max_error"].values[bent], np.abs(usual["stress_max"].values - fine)[bent]
+    loaded = np.isfinite(fine) & (fine > 0.1 * np.nanmax(fine))
+    bound, off = usual["stress_max_error"].values[loaded], np.abs(usual["stress_max"].values - fine)[loaded]
     # 3.5 to 60 times the error here.
     assert np.all(off < bound)
     assert np.all(bound < 3.0 * np.nanmax(fine))
@@ -296,12 +296,12 @@ def test_errors_of_stresses_are_within_their_bounds(name, geometry, mode, method
     for tolerance in (1e-5, 1e-6):
         found = stresses(tolerance)
         bound, off = found["stress_max_error"].values, np.abs(found["stress_max"].values - exact)
-        bent = np.isfinite(exact) & (exact > 0.1 * np.nanmax(exact))
+        loaded = np.isfinite(exact) & (exact > 0.1 * np.nanmax(exact))
         # 2.4 to 100 times the error of the beam that is off most.
-        worst = int(np.nanargmax(np.where(bent, off / bound, np.nan)))
+        worst = int(np.nanargmax(np.where(loaded, off / bound, np.nan)))
         assert off[worst] < bound[worst]
         # Of the four-bar, which starts with a blow and has no damping, as large as the stress; a tenth of it is usual.
-        assert np.nanmax(bound[bent]) < (3.0 if name == "four_bar" else 0.6) * np.nanmax(exact)
+        assert np.nanmax(bound[loaded]) < (3.0 if name == "four_bar" else 0.6) * np.nanmax(exact)
 
 
 @pytest.mark.parametrize("size", [3e-4, 1e-2, 1.0, 50.0])

@@ -88,10 +88,6 @@ def work(request):
     except ImportError:
         pass
     __import__("time").sleep(600)
-answer(work)
-sys.argv = ["paraflex", "info"]
-from paraflex.__main__ import main
-main()
 """
 # One in llvmlite, whose code must not be left with two owners.
 OWNED = """
@@ -112,10 +108,6 @@ def work(request):
     linker.ffi = types.SimpleNamespace(OutputString=__import__("contextlib").nullcontext, lib=lib)
     linker.link_modules(None, Source())
     __import__("time").sleep(600)
-answer(work)
-sys.argv = ["paraflex", "info"]
-from paraflex.__main__ import main
-main()
 """
 # A library in which an interrupt is lost: nothing can be raised where an object goes.
 LOST = """
@@ -127,10 +119,6 @@ class Gone:
 def work(request):
     Gone()
     __import__("time").sleep(600)
-answer(work)
-sys.argv = ["paraflex", "info"]
-from paraflex.__main__ import main
-main()
 """
 # One that makes an error of its own of an interrupt.
 OTHER = """
@@ -141,6 +129,9 @@ def work(request):
         __import__("time").sleep(600)
     except KeyboardInterrupt:
         raise ImportError("a library was left half imported")
+"""
+# What all of them end with.
+CALLED = """
 answer(work)
 sys.argv = ["paraflex", "info"]
 from paraflex.__main__ import main
@@ -230,7 +221,7 @@ def test_imports_before_the_command_begins_end_at_once(number, code):
     ],
 )
 def test_libraries_do_not_keep_a_command_from_ending(script, when, last):
-    with started(sys.executable, "-c", ANSWER + script) as child:
+    with started(sys.executable, "-c", ANSWER + script + CALLED) as child:
         child.until(lambda: when in child.out)
         child.send(signal.SIGTERM)
         done = child.end()

@@ -251,9 +251,9 @@ def test_a_cache_folder_that_cannot_be_reached_is_not_used(tmp_path, monkeypatch
         raise PermissionError(errno.EACCES, "Permission denied")
 
     environment = {cache_folder.VARIABLE: str(tmp_path / "x"), "HOME": str(tmp_path)}
-    said = []
-    monkeypatch.setattr(cache_folder, "_warn", said.append)
+    warnings = []
+    monkeypatch.setattr(cache_folder, "_warn", warnings.append)
     monkeypatch.setattr(Path, "exists", barred)
     cache_folder.ensure_cache_folder(tmp_path, environment)
     assert environment[cache_folder.VARIABLE] != str(tmp_path / "x")
-    assert "cannot be written: compiled kernels are kept elsewhere" in said[0]
+    assert "cannot be written: compiled kernels are kept elsewhere" in warnings[0]

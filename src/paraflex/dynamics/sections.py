@@ -125,9 +125,7 @@ class Sections:
         """
         if self.completion is not None:
             system, errors = self.completion.whole, self.completion.errors(errors)
-        first = 0
-        for part in self.parts:
-            own = slice(first, first := first + len(part.moment))
+        for part, own in self._parts_stations():
             body = system.body(part.body)
             off = np.concatenate([errors[body.flexible], body.modes.omega**2 * errors[body.flexible]])
             # Without an acceleration's part, rows have no columns for it.
@@ -140,14 +138,17 @@ class Sections:
     def _parts_loads(
         self, system: System, q: Array, v: Array, a: Array, multipliers: Array
     ) -> "Iterator[tuple[_Beam, SectionLoads]]":
-        first = 0
         if self.completion is not None:
             q, v, a = self.completion(q, v, a, multipliers)
             system = self.completion.whole
-        for part in self.parts:
-            own = slice(first, first := first + len(part.moment))
+        for part, own in self._parts_stations():
             sections = tuple(each[own] for each in (self.x, self.area, self.modulus, self.strength))
             yield part, _loads(system, part, sections, q, v, a, multipliers)
+
+    def _parts_stations(self) -> "Iterator[tuple[_Beam, slice]]":
+        first = 0
+        for part in self.parts:
+            yield part, slice(first, first := first + len(part.moment))
 
     @property
     def owners(self) -> tuple[str, ...]:

@@ -146,10 +146,7 @@ def allowed_part(controls, h, march):
 
 @routine
 def note_errors(controls, h, march):
-    """Record the largest multipliers, their changes by local errors within some cycles, and all of the coordinates.
-
-    How fast errors of coordinates decay is not known: a damped beam may swing for many cycles of a faster body.
-    """
+    """Record the largest multipliers, their changes by local errors within some cycles, and all of the coordinates."""
     forgotten = exp(-h / (controls.force_cycles * march.clock[at.CYCLE]))
     for r in range(march.guess_lam.size):
         march.forces[at.PEAK, r] = max(march.forces[at.PEAK, r], abs(march.stage_lam[1, 0, r]))
@@ -157,6 +154,7 @@ def note_errors(controls, h, march):
             march.forces[at.RECENT, r] = forgotten * march.forces[at.RECENT, r] + march.forces[at.LOCAL, r]
             unresolved = max(march.forces[at.RECENT, r], LOST_SHARE * march.forces[at.LOST, r])
             march.forces[at.UNRESOLVED, r] = max(march.forces[at.UNRESOLVED, r], unresolved)
+    # It is not known how fast these decay: a damped beam may swing for many cycles of a faster body.
     for j in range(march.q.size):
         march.errors[at.RECENT, j] += march.errors[at.LOCAL, j]
         unresolved = max(march.errors[at.RECENT, j], LOST_SHARE * march.errors[at.LOST, j])

@@ -26,6 +26,7 @@ duration, L the length of the path, m an effective mass of the free motion at th
 The constants are estimates, not bounds: `benchmarks/reduced_runs.py` compares them with runs.
 """
 
+from functools import cached_property
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -42,7 +43,7 @@ from paraflex.dynamics.tangents import MotionPoint, Tangency
 from paraflex.integrators.run import jump_times
 from paraflex.kernel.bodies import motion_forces
 from paraflex.kernel.packed import make_scratch
-from paraflex.mechanism import ActuationMode, Mechanism
+from paraflex.mechanism import ActuationMode
 from paraflex.tracking import TrackingTask, undeformed_at
 
 # Largest number of instants whose forces act in each pose.
@@ -134,7 +135,6 @@ class PlannedDeflections:
     def contributions(self, loading: "Loading") -> "Contributions":
         """Return deflections under a loading, and vibrations by it, with the deviations that they cause."""
         times = self.task.motion.t
-        jumping = _jumping(self.task.mechanism, times)
         # Between two poses the forces act in the nearer one.
         bounds = [0, *((one + other) // 2 + 1 for one, other in pairwise(self.samples)), times.size]
         found, half = [], (times[-1] - times[0]) ** 2 / 2.0
@@ -149,13 +149,23 @@ class PlannedDeflections:
             drift = structure.static_displacements(half * turned)
             found.append(self._products(statics, np.concatenate([at_effector, drift]), instants.size))
             units, omega = structure.vibrations(np.concatenate([statics, at_effector]))
-            vibrating = _vibrating(times, loading.forces @ units.T, omega, jumping)
+            vibrating = _vibrating(times, loading.forces @ units.T, omega, self._jumping)
             swing = np.linalg.norm(rows @ units.T, axis=0) * vibrating
             found.append(Contributions(units, swing * omega * (times[-1] - times[0]) / 2.0, 2.0 * swing))
             pushed = np.linalg.norm(rows @ free.T, 2) * half * vibrating**2 / (2.0 * self._length)
             found.append(Contributions(units, pushed, pushed))
         deflections, slopes, caps = (np.concatenate(parts) for parts in zip(*found, strict=True))
         return Contributions(deflections, slopes / len(self._structures), caps / len(self._structures))
+
+    @cached_property
+    def _jumping(self) -> Mask:
+        """Mask of the intervals between samples that hold a jump of a load or end with one, or hold a steep rise."""
+        mechanism, times = self.task.mechanism, self.task.motion.t
+        signals, knots = still_signals(mechanism, float(times[-1]))
+        jumps = jump_times(signals, inputs_of(mechanism), np.array(knots))
+        rises = np.setdiff1d(steep_times(mechanism, float(times[-1])), jumps)
+        ends = [*np.searchsorted(times, jumps), *np.searchsorted(times, rises, side="right")]
+        return np.isin(np.arange(1, times.size), ends)
 
     def _tangent_stiffness(self, sample: int, loading: "Loading", structure: "_Structure") -> Sparse:
         """Return the derivative (n, n) of the equations of motion by the coordinates, at constant multipliers."""
@@ -193,15 +203,6 @@ def _vibrating(times: Array, forces: Array, omega: Array, jumping: Mask) -> Arra
     swings = kinks * cosines + jumps * sines, jumps * cosines - kinks * sines
     swings[1][0] += forces[0]
     return np.max(np.hypot(*np.cumsum(swings, axis=1)), axis=0, initial=0.0)
-
-
-def _jumping(mechanism: Mechanism, times: Array) -> Mask:
-    """Return which intervals between times (k - 1,) hold a jump of a load or end with one, or hold a steep rise."""
-    signals, knots = still_signals(mechanism, float(times[-1]))
-    jumps = jump_times(signals, inputs_of(mechanism), np.array(knots))
-    rises = np.setdiff1d(steep_times(mechanism, float(times[-1])), jumps)
-    ends = [*np.searchsorted(times, jumps), *np.searchsorted(times, rises, side="right")]
-    return np.isin(np.arange(1, times.size), ends)
 
 
 class Loading(NamedTuple):

@@ -92,7 +92,6 @@ def system_links(system: System, solution: Solution, torques: Array, samples: in
     frame = frame_load(system, drawn.joints, loads, q, v)
     drives, sensors = mechanism.prescribed, [one.name for one in mechanism.sensors]
     found, off = section_result(system, q, v, a, multipliers), solution.coordinate_errors
-    bodies = [body.name for body in mechanism.bodies]
     variables: Variables = {
         "angle": (("body",), q[:, first]),
         "angular_velocity": (("body",), v[:, first]),
@@ -121,11 +120,11 @@ def system_links(system: System, solution: Solution, torques: Array, samples: in
         given = [one.name for one in system.mechanism.sensors]
         variables[READING] = ((SENSOR,), _by_name(readings, given, sensors))
     if found is not None:
-        variables |= section_variables(found, bodies)
+        variables |= section_variables(found, [body.name for body in mechanism.bodies])
     return Links(
         variables=variables,
         load_errors=None if errors is None else load_errors(system, joints, errors),
-        stress_errors=None if off is None or found is None else stress_errors(system, off, bodies),
+        stress_errors=None if off is None or found is None else stress_errors(system, off),
         sections=None if found is None else found.sections,
     )
 

@@ -12,7 +12,6 @@ from paraflex.control.loop.run_loop import ControllerRecord
 from paraflex.control.loop.runs import ControlledMotion, ControlledTracking
 from paraflex.dynamics import System, joint_coordinate
 from paraflex.dynamics.joint_loads import LoadComponents, drive_torques, joint_loads, load_errors, undetermined_loads
-from paraflex.dynamics.sections import sections_of
 from paraflex.equilibria.conditions import Coordinate
 from paraflex.equilibria.result import Statics
 from paraflex.integrators import Solution
@@ -22,7 +21,7 @@ from paraflex.validity import Validity
 from .formulas import length
 from .numbers import stacked
 from .outlines import deflections
-from .stress import SectionResult, section_result
+from .stress import SectionResult, section_result, stress_errors
 from .traces import Trace, Traces
 
 R = TypeVar("R", TrackingRun, MotionRun, Statics)
@@ -95,9 +94,8 @@ class SolutionTraces(Generic[R]):
     @property
     def stress_error(self) -> float:
         """Bound of the integration errors of stresses [Pa]; NaN if unknown."""
-        errors, sections = self.solution.coordinate_errors, sections_of(self.system)
-        known = () if errors is None or sections is None else sections.stress_errors(self.system, errors)
-        return float(np.fmax.reduce([error for _, error in known], initial=np.nan))
+        errors = self.solution.coordinate_errors
+        return np.nan if errors is None else float(np.fmax.reduce(stress_errors(self.system, errors), initial=np.nan))
 
     @cached_property
     def joint_speed(self) -> Trace:

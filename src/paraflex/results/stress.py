@@ -71,9 +71,10 @@ def section_result(system: System, q: Array, v: Array, a: Array, multipliers: Ar
     return SectionResult(replace(sections, bodies=owners, x=sections.x + starts), loads._replace(x=x))
 
 
-def stress_errors(system: System, errors: Array, bodies: list[str]) -> Array:
+def stress_errors(system: System, errors: Array) -> Array:
     """Return bounds of the errors of stresses (bodies,) [Pa], NaN without stresses, from those of coordinates (n,)."""
-    out, sections = np.full(len(bodies), np.nan), sections_of(system)
+    bodies, sections = [body.name for body in system.described.bodies], sections_of(system)
+    out = np.full(len(bodies), np.nan)
     for name, error in () if sections is None else sections.stress_errors(system, errors):
         b = bodies.index(system.carrier(name)[0])
         out[b] = np.fmax(out[b], error)
