@@ -52,9 +52,12 @@ RUBBER = Material(youngs_modulus=5e6, density=1100.0)
 
 
 def pytest_collection_modifyitems(items):
-    """Begin with the files that take longest, see `LONGEST`; the others keep their order."""
+    """Begin with the files that take longest, see `LONGEST`; a test whose browser died runs once more."""
     place = {name: k for k, name in enumerate(LONGEST)}
     items.sort(key=lambda item: place.get(item.path.stem, len(LONGEST)))
+    for item in items:
+        if "browser" in item.fixturenames:
+            item.add_marker(pytest.mark.flaky(reruns=1, only_rerun="TargetClosedError"))
 
 
 @pytest.fixture(scope="session")
@@ -199,6 +202,27 @@ def chromium() -> str | None:
     return os.environ.get("PARAFLEX_CHROMIUM") or next(filter(None, map(shutil.which, names)), None)
 
 
+class LastingBrowser:
+    """A Chromium that is started again where it has died: a foreign program, which did so in one suite of many."""
+
+    def __init__(self, launch):
+        self._launch, self._browser = launch, launch()
+
+    def alive(self):
+        """The browser, started again if it has died."""
+        if not self._browser.is_connected():
+            self._browser = self._launch()
+        return self._browser
+
+    def new_context(self, **settings):
+        """A window with a memory of its own."""
+        return self.alive().new_context(**settings)
+
+    def new_page(self, **settings):
+        """A page in such a window."""
+        return self.alive().new_page(**settings)
+
+
 @pytest.fixture(scope="module")
 def browser():
     path = chromium()
@@ -211,9 +235,9 @@ def browser():
 
     with sync_playwright() as playwright:
         # Root, as containers have it, may not make the sandbox; the pages are our own.
-        browser = playwright.chromium.launch(executable_path=path, args=["--no-sandbox"])
+        browser = LastingBrowser(lambda: playwright.chromium.launch(executable_path=path, args=["--no-sandbox"]))
         yield browser
-        browser.close()
+        browser.alive().close()
 
 
 @pytest.fixture

@@ -5,10 +5,10 @@ from itertools import combinations
 from pathlib import Path
 
 import pytest
-from playwright.sync_api import Browser, Page
+from playwright.sync_api import Error, Page
 
 from colours import APART, colour_distance
-from conftest import DESKTOP, PHONE, is_ours, page_asks
+from conftest import DESKTOP, PHONE, LastingBrowser, is_ours, page_asks
 from paraflex.figures.charts import Axis
 from paraflex.plots.themes import THEMES
 from paraflex.report import Chart, Curve, Page as ReportPage, Panel, save_page, tracking_page, verification_page
@@ -40,7 +40,7 @@ PUT_BACK = """() => {
 class SharedPages:
     """A report in windows of several sizes, each opened once (that takes 2 s) and put back for every test."""
 
-    def __init__(self, browser: Browser, report: Path) -> None:
+    def __init__(self, browser: LastingBrowser, report: Path) -> None:
         self._browser, self._report = browser, report
         self._pages: dict[tuple[int, ...], Page] = {}
         self._complaints: list[str] = []
@@ -48,7 +48,7 @@ class SharedPages:
     def __call__(self, viewport: dict[str, int] = DESKTOP) -> Page:
         """The page in a window, as it was opened."""
         size = tuple(viewport.values())
-        if size in self._pages:
+        if size in self._pages and not self._pages[size].is_closed():
             self._pages[size].emulate_media(media="null")
             self._pages[size].evaluate(PUT_BACK)
         else:
@@ -553,3 +553,12 @@ def test_more_than_six_charts_of_a_panel_are_folded_and_drawn_once_they_are_open
     page.evaluate("dispatchEvent(new Event('beforeprint'))")
     assert page.locator("#chart-c6").is_visible()
     page.evaluate("dispatchEvent(new Event('afterprint'))")
+
+
+def test_a_browser_that_died_is_started_again(browser, shared):
+    """So one crash of Chromium does not fail all tests that come after it."""
+    before = shared()
+    with pytest.raises(Error, match="has been closed"):
+        browser.alive().new_browser_cdp_session().send("Browser.crash")
+    assert before.is_closed()
+    assert shared().locator("#canvas").is_visible()
