@@ -1,12 +1,15 @@
 """Starting: what is not needed is not imported, nothing is compiled by an import, and caches find a place."""
 
 import os
+import pickle
 import shutil
 import sys
 import tempfile
+from dataclasses import replace
 from importlib import import_module
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import paraflex
@@ -15,6 +18,9 @@ from paraflex import cache_folder
 from paraflex.checks import check_planned
 from paraflex.checks.drawing import pose_of
 from paraflex.cli.inspect import describe
+from paraflex.dynamics import build_system
+from paraflex.dynamics.coordinates import body_coordinates
+from paraflex.dynamics.sections import sections_of
 from paraflex.plots.model_drawing import model_drawing
 from processes import run
 
@@ -146,10 +152,10 @@ def work(monkeypatch):
 def test_nothing_is_computed_twice(work):
     """Of the mechanism with flexible and with rigid bodies one system each, of the path one without springs.
 
-    The check of a study plans with rigid bodies, and needs one more.
+    The check of a study plans with rigid bodies, and needs one more. Equal links have one eigenproblem: there are long
+    and short ones, and long ones with the end-effector.
     """
-    model = pf.load("raparm_i")
-    flexible = len(model.mechanism.bodies)
+    model, flexible = pf.load("raparm_i"), 3
     assert work() == (0, 0, 0, 0)
     assert describe(model)["name"] == "RAParM-I"
     assert work() == (4, flexible, 2, 1)
@@ -167,7 +173,27 @@ def test_nothing_is_computed_twice(work):
 def test_a_changed_length_takes_one_more_system_of_each_kind(work):
     model = pf.load("raparm_i", set={"link1.length": 0.3})
     pf.linearise(model, mode="++++")
-    assert work() == (2, len(model.mechanism.bodies), 0, 0)
+    assert work() == (2, 4, 0, 0)
+
+
+def test_equal_beams_share_integrals_modes_and_rows_of_sections():
+    arm = pf.library.raparm_i().with_geometry("second-order")
+    # Another strength is no other beam, but has other sections.
+    strong = replace(arm.bodies[0], material=replace(arm.bodies[0].material, strength=1e9))
+    system = build_system(replace(arm, bodies=(strong, *arm.bodies[1:])))
+    assert len({id(body.integrals) for body in system.bodies}) == 3
+    for described, body in zip(system.mechanism.bodies, system.bodies, strict=True):
+        alone = body_coordinates(described, system.mechanism.geometry)
+        assert alone.name == body.name
+        assert np.array_equal(alone.integrals.D, body.integrals.D)
+        assert np.array_equal(alone.points.N, body.points.N)
+    parts, strength = sections_of(system).parts, sections_of(system).strength
+    assert strength[0] == 1e9
+    assert not np.any(strength[len(parts[0].x) :] == 1e9)
+    assert [part.body for part in parts] == [body.name for body in system.bodies]
+    assert len({id(part.moment) for part in parts}) == 3
+    copied = pickle.loads(pickle.dumps(system))
+    assert np.array_equal(sections_of(copied).parts[-1].moment, parts[-1].moment)
 
 
 def test_methods_are_listed_without_mechanisms():

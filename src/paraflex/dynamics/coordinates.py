@@ -1,5 +1,6 @@
 """Coordinates and material points of a body: the only module that maps slices of q to bodies."""
 
+from collections.abc import Hashable, MutableMapping
 from dataclasses import dataclass, field, replace
 from functools import cache, cached_property
 
@@ -135,7 +136,12 @@ class Marker:
         return s
 
 
-def body_coordinates(body: Body, geometry: Geometry, like: ModalBasis | None = None) -> BodyCoordinates:
+def body_coordinates(
+    body: Body,
+    geometry: Geometry,
+    like: ModalBasis | None = None,
+    others: MutableMapping[Hashable, BodyCoordinates] | None = None,
+) -> BodyCoordinates:
     """Return the coordinates of a body with all its modes, undamped, with offset 0.
 
     Parameters
@@ -146,6 +152,8 @@ def body_coordinates(body: Body, geometry: Geometry, like: ModalBasis | None = N
         Geometry of the mechanism, linear or of second order.
     like : ModalBasis, optional
         Modes of a slightly different body, which these modes follow in order and sign: see `ModalBasis.like`.
+    others : mapping, optional
+        Coordinates of bodies computed before, to which these are added: equal beams share integrals and modes.
 
     Raises
     ------
@@ -154,6 +162,10 @@ def body_coordinates(body: Body, geometry: Geometry, like: ModalBasis | None = N
     """
     try:
         shape = body_shape(body)
+        # Integrals of equal beams are one object.
+        kind = id(shape.integrals), id(like), isinstance(body, RigidBody) or body.flexible
+        if others is not None and kind in others:
+            return replace(others[kind], name=body.name, shape=shape)
         integrals = shape.integrals
         if not isinstance(body, RigidBody) and not body.flexible:
             integrals = integrals.without_flexibility()
@@ -173,7 +185,10 @@ def body_coordinates(body: Body, geometry: Geometry, like: ModalBasis | None = N
     points = None
     if geometry is Geometry.SECOND_ORDER and integrals.nf and isinstance(body, FlexibleBeam):
         points = mass_points(body.mesh, body.spans, beam_lumps(body), integrals.D)
-    return BodyCoordinates(body.name, 0, integrals, modes, shape, points, np.zeros((integrals.nf, integrals.nf)))
+    found = BodyCoordinates(body.name, 0, integrals, modes, shape, points, np.zeros((integrals.nf, integrals.nf)))
+    if others is not None:
+        others[kind] = found
+    return found
 
 
 @dataclass(frozen=True)

@@ -122,8 +122,18 @@ def slowest_deflection(system: System, q: Array) -> float:
     """Return the lowest angular frequency of an assembled mechanism by the stiffness of its beams alone [rad/s].
 
     Springs, loads and weight are left out. The result is infinite if nothing vibrates. For more than 600 coordinates it
-    is the lowest frequency of a single beam.
+    is the lowest frequency of a single beam. That of the last pose is cached, from which other runs may start.
     """
+    last, pose = system.once("slowest deflection", dict), q.tobytes()
+    found = last.get(pose)
+    if found is None:
+        found = _slowest_deflection(system, q)
+        last.clear()
+        last[pose] = found
+    return found
+
+
+def _slowest_deflection(system: System, q: Array) -> float:
     elastic = stiffness_diagonal(system)
     if not np.any(elastic > 0.0):
         return np.inf

@@ -134,6 +134,10 @@ class System(PlacedBodies):
             kept[name] = make()
         return kept[name]
 
+    def __getstate__(self) -> dict[str, Any]:
+        """Leave out what `once` has cached: it is found by identities of objects, which copies do not have."""
+        return {name: value for name, value in vars(self).items() if name != "_kept"}
+
     @cached_property
     def row_terms(self) -> dict[str, list[RowTerm]]:
         """Terms of constraint rows, by joint."""
@@ -219,8 +223,9 @@ def build_system(mechanism: Mechanism, like: System | None = None) -> System:
     constraints = row_order(mechanism)
     modes = {} if like is None else {body.name: body.modes for body in like.bodies}
     reduced = [body.name for body in mechanism.bodies if is_reduced(mechanism, body)]
+    others: dict[Hashable, BodyCoordinates] = {}
     whole = tuple(
-        body_coordinates(body, mechanism.geometry, None if body.name in reduced else modes.get(body.name))
+        body_coordinates(body, mechanism.geometry, None if body.name in reduced else modes.get(body.name), others)
         for body in mechanism.bodies
     )
     undamped, offset, given = [], 0, PlacedBodies(mechanism, whole)

@@ -30,7 +30,7 @@ _PART_OF_STEP = 0.25
 # Largest number of coordinates of all samples together, for memory.
 _MOST_NUMBERS = 4_000_000
 # Numbers of one kind of load that are processed at a time, to fit into the processor's cache.
-_AT_A_TIME = 8_000
+_AT_A_TIME = 32_000
 # Negligible loads: stress [MPa], and forces as a part of the total weight.
 _NO_STRESS, _NO_FORCE = 1e-3, 1e-3
 _GRAVITY = 9.81

@@ -293,8 +293,10 @@ def subtract_geometric(system, i, geometric, scale, u, x):
     if geometric is not None and body.slopes > 0:
         e, n = body.offset + 3, body.nf
         for j in range(n):
+            total, row = 0.0, body.square + j * n
             for l in range(n):
-                x[e + j] -= scale * geometric[body.square + j * n + l] * u[e + l]
+                total += geometric[row + l] * u[e + l]
+            x[e + j] -= scale * total
 
 
 @routine

@@ -94,10 +94,8 @@ def filtered_error(system, g, gains, march, work, slow):
         march.clock[at.MEMORY] = MEMORY_PART * march.clock[at.CYCLE]
         factor_system(system, march.clock[at.MEMORY] * march.clock[at.MEMORY], march.q, slow)
     memory = march.clock[at.MEMORY]
-    for j in range(march.q.size):
-        march.eq[j] = 0.0
-        march.ev[j] = work.x[j]
-    filter_error(system, memory, gains, march.eq, march.ev, slow)
+    copy(work.x, march.ev)
+    filter_error(system, memory, gains, None, march.ev, slow)
     return position, memory * mass_norm(system, slow, slow.x)
 
 
@@ -114,13 +112,12 @@ def note_lost_vibrations(system, controls, h, g, march, work):
     fill(march.errors[at.LOST], 0.0)
     if not isinf(controls.force_cycles) or h < GROWN * march.clock[at.LAST_STEP]:
         return
-    fill(march.eq, 0.0)
     for s in range(march.stage_a.shape[1]):
         copy(march.stage_a[1, 0] if s == 0 else march.stage_a[0, s], march.ev)
-        filter_error(system, g, UNCHANGED, march.eq, march.ev, work)
+        filter_error(system, g, UNCHANGED, None, march.ev, work)
         for j in range(march.ev.size):
             march.ev[j] -= work.x[j]
-        filter_error(system, g, UNCHANGED, march.eq, march.ev, work)
+        filter_error(system, g, UNCHANGED, None, march.ev, work)
         for r in range(work.mu.size):
             march.forces[at.LOST, r] = max(march.forces[at.LOST, r], abs(work.mu[r]))
         for j in range(march.ev.size):
@@ -163,23 +160,27 @@ def note_errors(controls, h, march):
 
 @routine
 def filter_error(system, g, gains, eq, ev, work):
-    """Compute eps_v of (1 - g J) eps = (e_q, e_v) into work.x, with the factor in `work` made for b = g^2."""
+    """Compute eps_v of (1 - g J) eps = (e_q, e_v) into work.x, with the factor in `work` made for b = g^2.
+
+    `eq` is None if e_q is zero.
+    """
     of_v, alpha, beta = gains
     scale = 1.0 + 2.0 * alpha * g + beta * beta * g * g
-    for j in range(eq.size):
-        work.x[j] = ev[j]
-        work.f[j] = eq[j]
+    copy(ev, work.x)
+    if eq is not None:
+        copy(eq, work.f)
     fill(work.mu, 0.0)
     for i in range(system.bodies.size):
         body = system.bodies[i]
         to_body_frame(system, i, work, work.x)
-        to_body_frame(system, i, work, work.f)
         jacobian_times(system, i, work, work.x, of_v / scale, 0.0, 0.0, work.mu)
-        jacobian_times(system, i, work, work.f, -beta * beta * g / scale, -1.0 / g, 0.0, work.mu)
         mass_times(system, i, work, work.mass, work.x)
-        e = body.offset + 3
-        for j in range(body.nf):
-            work.x[e + j] -= g * system.modal[OMEGA2, body.flex + j] * eq[e + j]
-        subtract_geometric(system, i, work.geometric, g, eq, work.x)
+        if eq is not None:
+            to_body_frame(system, i, work, work.f)
+            jacobian_times(system, i, work, work.f, -beta * beta * g / scale, -1.0 / g, 0.0, work.mu)
+            e = body.offset + 3
+            for j in range(body.nf):
+                work.x[e + j] -= g * system.modal[OMEGA2, body.flex + j] * eq[e + j]
+            subtract_geometric(system, i, work.geometric, g, eq, work.x)
         to_ground_frame(system, i, work, work.x)
     solve_system(system, work, work.x, work.mu)

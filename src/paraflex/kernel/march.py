@@ -9,6 +9,7 @@ from .compiling import kernel, releases_lock, routine
 from .constraints import constraint_values, note_friction
 from .error import note_errors
 from .factor import factor_bodies
+from .guesses import note_inertias
 from .linear import SINGULAR_PART, orient
 from .metric import mass_norm
 from .near import note_crossing
@@ -88,6 +89,7 @@ def begin(system, signals, controls, march, work):
     """Compute the first stage of a run, or after a jump."""
     t = march.clock[at.TIME]
     march.counts[at.JUMPED] = 0
+    note_inertias(system, march)
     first_stage(system, signals, t, controls, march, work)
     a, lam = march.stage_a[1, 0], march.stage_lam[1, 0]
     # Starting guesses must not extrapolate across a jump: stages before it do not count as other times.

@@ -6,8 +6,9 @@ tuples.
 """
 
 from hashlib import blake2b
-from typing import TypeVar
+from typing import Any, TypeVar
 
+import numpy as np
 from llvmlite import ir
 from numba import types
 from numba.core import cgutils
@@ -16,6 +17,8 @@ from numba.core.typing.templates import AttributeTemplate, infer_getattr
 from numba.extending import NativeValue, models, register_model, typeof_impl, unbox
 
 R = TypeVar("R", bound=type)
+# Numba types of arrays by what they depend on: Numba takes twenty times longer to find one, and a run has hundreds.
+_ARRAYS: dict[tuple[Any, ...], types.Type | None] = {}
 
 
 class _Reference(types.Type):
@@ -43,12 +46,22 @@ class _Attributes(AttributeTemplate):
         return typ.fields.get(attr)
 
 
+def _type_of(field: Any, context: Any) -> types.Type | None:
+    if type(field) is not np.ndarray:
+        return typeof_impl(field, context)
+    flags = field.flags
+    kind = field.dtype, field.ndim, flags.c_contiguous, flags.f_contiguous, flags.writeable, flags.aligned
+    if kind not in _ARRAYS:
+        _ARRAYS[kind] = typeof_impl(field, context)
+    return _ARRAYS[kind]
+
+
 def by_reference(record: R) -> R:
     """Register a named tuple to be passed to kernels by reference."""
 
     @typeof_impl.register(record)
     def _(value, context):
-        fields = tuple(typeof_impl(field, context) for field in value)
+        fields = tuple(_type_of(field, context) for field in value)
         return None if None in fields else _Reference(record, fields)
 
     return record

@@ -5,11 +5,12 @@ from typing import Annotated, NamedTuple
 from paraflex.arrays import Array, Indices, Mask
 from .arrays import Floats, Ints, allocated
 from .compiling import by_reference
+from .vectors import LANES
 
 # Largest number of singular positions recorded in a run.
 MOST_PASSAGES = 1000
-# Number of stages from which the guess of the next stage is extrapolated.
-GUESS_FROM = 3
+# Largest number of stages that the guess of the next stage is made of.
+GUESS_FROM = 6
 # Return codes of `march`.
 PAUSED, FINISHED, NO_CONVERGENCE, NOT_FINITE, ERROR_TEST = range(5)
 # Further return code of `attempt`: the step comes near a singular position, and its start is to be prepared.
@@ -95,8 +96,13 @@ class March(NamedTuple):
     algorithmic: Annotated[Floats, 2, "n"]  # algorithmic accelerations of the Newmark family, last and this step
     passages: Annotated[Floats, 2, MOST_PASSAGES]  # start and end of intervals around singular positions
     opening: Annotated[Floats, "n"]  # direction that opens the row nearest to dependence, near a singular position
-    guess_t: Annotated[Floats, GUESS_FROM]  # times of the stages a guess is extrapolated from
+    guess_t: Annotated[Floats, GUESS_FROM]  # times of the stages that a guess is made of, see `kernel.guesses`
     guess_s: Annotated[Ints, GUESS_FROM, 2]  # their indices in stage_a
+    guess_w: Annotated[Floats, GUESS_FROM]  # their weights
+    guess_d: Annotated[Floats, "differences"]  # accelerations at these stages, then the solution's, less the nearest
+    guess_sums: Annotated[Floats, "sums"]  # products of these for each stage, of which weights are learned
+    guess_factor: Annotated[Floats, GUESS_FROM, GUESS_FROM]
+    inertias: Annotated[Floats, "n"]
 
 
 @by_reference
@@ -116,5 +122,6 @@ class Samples(NamedTuple):
 def make_march(n: int, m: int, stages: int, acting: int, treatment: int = BAUMGARTE) -> March:
     """Allocate the state of a run with n coordinates and m constraint rows."""
     sizes = {"n": n, "m": m, "stages": stages, "acting": acting, "shifted": n if treatment == GGL else 0}
+    sizes |= {"differences": LANES * n, "sums": stages * GUESS_FROM * LANES}
     march = allocated(March, sizes)
     return march if treatment == GGL else march._replace(stage_d=march.stage_v)

@@ -90,16 +90,23 @@ def solve_samples(system, signals, controls, t, h, first, march, work, out, asid
     interpolated acceleration. Deflections of flexible bodies cannot be interpolated as accurately as forces: with
     flexible bodies such samples are always solved in long steps.
 
-    Each sample is solved with the factor of the step, or with a factor made at the sample if that fails. Near a
-    singular position, where rows of the step's factor are held, the factor is made at once.
+    Each sample is solved with the factor of the step, rotated to the step's middle, or with a factor made at the sample
+    if that fails. Near a singular position, where rows of the step's factor are held, the factor is made at once. A
+    kept sample does not depend on the others.
     """
     near, g, b = march.counts[at.NEAR] > 0, march.clock[at.STAGE_G], march.clock[at.STAGE_B]
     weights = INDEX_1
     if controls.treatment == BAUMGARTE:
         weights = constraint_weights(controls, march.clock[at.TRIED])[0]
+    rotated = near
     for i in range(first, march.counts[at.SAMPLE]):
         needed = near or out.stored[i] or (h >= controls.long_from and march.clock[at.SAMPLE_CHANGE] > FORCES_BETWEEN)
         if needed and out.times[i] < t + h * (1.0 - SAME_TIME):
+            if not rotated:
+                rotated = True
+                for j in range(march.q.size):
+                    work.q[j] = 0.5 * (march.q[j] + march.stage_q[march.power.size - 1, j])
+                orient(system, work.q, work, controls.dependent_part)
             explicit_parts(out.q[i], out.v[i], out.a[i], g, b, march)
             copy(out.a[i], march.eq)
             copy(out.lam[i], march.guess_lam)
@@ -185,8 +192,10 @@ def solve_at(system, signals, t, weights, g, b, contraction, march, work, a, lam
 
 @routine
 def write_energies(system, tableau, t, h, first, march, work, out):
-    """Compute energies and work at the samples of the step from `first` on."""
+    """Compute energies and work at the samples of the step from `first` on that are kept."""
     for i in range(first, march.counts[at.SAMPLE]):
+        if not out.stored[i]:
+            continue
         kinetic, strain, weight = stored_energy(system, out.q[i], out.v[i], out.lam[i], work.scratch)
         out.energy[i, 0], out.energy[i, 1] = kinetic, strain
         out.energy[i, 2] = march.clock[at.WORK]

@@ -15,17 +15,20 @@ from .compiling import routine
 from .constraints import dissipated_power, note_friction
 from .error import allowed_part, embedded_error, filtered_error, force_error, history_error, note_lost_vibrations
 from .factor import factor_bodies
+from .guesses import extrapolate_accelerations, guess, learn
 from .joints import line_energy, load_power, marker_angle, modal_damping_power
 from .linear import SINGULAR_PART, orient
 from .newmark import newmark_end, newmark_start
 from .packed import INDEX_1
-from .run_state import ENTERS, GGL, GUESS_FROM, NO_CONVERGENCE, NOT_FINITE, PAUSED, POSITION, PROJECTION
+from .run_state import ENTERS, GGL, NO_CONVERGENCE, NOT_FINITE, PAUSED, POSITION, PROJECTION
 from .signals import evaluate_signal
 from .stage import CONVERGED, SINGULAR, SLOW, WORST_CONTRACTION, place, solve_stage
 
 # A new factor costs about as much as this many iterations, so it pays once the old one has cost as many more. In
 # second-order geometry it costs more.
 FACTOR_COST, BENT_FACTOR_COST = 2, 3
+# Schemes of more stages learn weights of guesses in steps of varying size, too.
+LEARN_FROM = 3
 # Number of steps that get a new factor each, after a factor that cost that much in its second step.
 IMPATIENCE = 20
 # Largest number of times that a stage is continued: with friction slopes at its current rates, or since it contracts
@@ -38,8 +41,6 @@ NEWTON_MEMORY = 0.02
 FORCE_FRACTION = 0.03
 # Largest Baumgarte coefficients, times the step size.
 LARGEST_GAIN = 0.3
-# Stages closer than this part of a step count as one time: a guess is extrapolated from different times.
-SAME_TIME = 1e-6
 
 
 @routine
@@ -55,46 +56,6 @@ def input_power(system, signals, t, q, v, lam, torques, work):
             _, rate, _ = evaluate_signal(signals, system.rows[r].signal, t)
             total -= lam[r] * rate
     return total
-
-
-@routine
-def nearest_stages(i, t, h, march):
-    """Find the stages of this step and the last one that are nearest to a time t, for guesses of stage i.
-
-    Their number is returned, their times and indices are in march.guess_t and march.guess_s, the nearest first.
-    """
-    stages, times, rows = march.stage_v.shape[0], march.guess_t, march.guess_s
-    found = 0
-    for k in range(i + stages):
-        # Of stages at one time the latest counts.
-        step, s = (1, i - 1 - k) if k < i else (0, stages - 1 - (k - i))
-        time, place = march.stage_t[step, s], found
-        while place > 0 and abs(time - t) < abs(times[place - 1] - t):
-            place -= 1
-        for l in range(found):
-            if abs(time - times[l]) < SAME_TIME * h:
-                place = GUESS_FROM
-        if place < GUESS_FROM:
-            found = min(found + 1, GUESS_FROM)
-            for l in range(found - 1, place, -1):
-                times[l], rows[l, 0], rows[l, 1] = times[l - 1], rows[l - 1, 0], rows[l - 1, 1]
-            times[place], rows[place, 0], rows[place, 1] = time, step, s
-    return found
-
-
-@routine
-def extrapolate(values, found, t, march, out):
-    """Evaluate the polynomial through values (2, stages, k) at the stages of `nearest_stages` at a time."""
-    times, rows = march.guess_t, march.guess_s
-    fill(out, 0.0)
-    for k in range(found):
-        weight = 1.0
-        for l in range(found):
-            if l != k:
-                weight *= (t - times[l]) / (times[k] - times[l])
-        source = values[rows[k, 0], rows[k, 1]]
-        for j in range(out.size):
-            out[j] += weight * source[j]
 
 
 @routine
@@ -212,6 +173,7 @@ def attempt(system, signals, tableau, controls, t, h, march, work, slow):
             newton_tolerance, force_tolerance * force / system.total_mass * max(b, g * newton_memory)
         )
     before = march.counts[at.ITERATIONS]
+    learns = not one_stage and (stages > LEARN_FROM or controls.fixed_step > 0.0)
     i, rounds, held = 1, 0, 0.0
     while i < stages:
         if not one_stage:
@@ -219,12 +181,7 @@ def attempt(system, signals, tableau, controls, t, h, march, work, slow):
         march.stage_t[1, i] = t + tableau.c[i] * h
         held, lag = near.trust(weights, g, b, x - t, march)
         if rounds == 0:
-            found = nearest_stages(i, x, h, march)
-            extrapolate(march.stage_a, found, x, march, march.stage_a[1, i])
-            # Near a singular position multipliers have a pole.
-            if march.counts[at.NEAR] > 0:
-                found = 1
-            extrapolate(march.stage_lam, found, x, march, march.stage_lam[1, i])
+            guess(i, (x - t) / h, h, learns, march.counts[at.NEAR] > 0, tableau, march)
             fill(march.shift, 0.0)
         status, iterations, contraction = solve_stage(
             system, signals, x, g, b, weights, march.qs, march.vs, march.stage_a[1, i], march.stage_lam[1, i],
@@ -240,7 +197,7 @@ def attempt(system, signals, tableau, controls, t, h, march, work, slow):
                 continue
             near.note_position(march.stage_t[1, i], t, h, march)
             # The constraints do not determine the accelerations here, so they are extrapolated.
-            extrapolate(march.stage_a, nearest_stages(i, x, h, march), x, march, march.stage_a[1, i])
+            extrapolate_accelerations(i, (x - t) / h, h, tableau, march)
             place(march.qs, march.vs, g, b, march.stage_a[1, i], march.shift, work)
         elif status != CONVERGED:
             if fresh and perhaps_near and march.counts[at.NEAR] == 0 and not at_singular:
@@ -261,6 +218,8 @@ def attempt(system, signals, tableau, controls, t, h, march, work, slow):
                 note_friction(system, march.q, work.v, work.mu, work.compliance)
             orient(system, march.q, work, controls.dependent_part)
             continue
+        elif learns and iterations > 1 and march.counts[at.NEAR] == 0:
+            learn(i, (x - t) / h, h, tableau, march)
         rounds = 0
         if one_stage:
             varying = controls.fixed_step == 0.0 or t < march.clock[at.PART_END]

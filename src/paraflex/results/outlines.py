@@ -129,10 +129,14 @@ def outline_motion(system: System, drawn: Outline, q: Array) -> Array:
 def _in_frame(system: System, drawn: Outline, q: Array) -> Array:
     """Return the positions of `outline_motion` in the frame of a body, which is not divided into parts."""
     body = system.body(drawn.body)
-    u, rows = q[:, body.flexible], _rows(system, body, drawn)
+    # Equal beams share integrals and with them what the same stations need.
+    key = id(body.integrals), drawn.places.tobytes()
+    u, rows = q[:, body.flexible], system.once(("rows", *key), lambda: _rows(system, body, drawn))
     local = drawn.places + (u @ rows.reshape(2 * len(rows), body.nf).T).reshape(len(u), *rows.shape[:2])
     if body.points is not None and body.mesh is not None:
-        local[:, :, 0] -= 0.5 * slope_square_integrals(body.mesh, body.integrals.D, drawn.places[:, 0])(u)
+        mesh, x = body.mesh, drawn.places[:, 0]
+        squares = system.once(("squares", *key), lambda: slope_square_integrals(mesh, body.integrals.D, x))
+        local[:, :, 0] -= 0.5 * squares(u)
     return local
 
 

@@ -55,31 +55,35 @@ class Bending(NamedTuple):
 def bending_of(system: System, name: str, solution: Solution) -> Bending:
     """Return the bending of a flexible body over a run of one or more samples."""
     body, described = system.body(name), system.mechanism.body(name)
-    u, line = solution.q[:, body.flexible], _line(body, described)
+    u = solution.q[:, body.flexible]
+    # Equal beams share integrals and with them this.
+    line = system.once(("line", id(body.integrals)), lambda: _line(body, described))
     given = not isinstance(described, FlexibleBeam)
     tangent = not given and described.reference is ReferenceCondition.CANTILEVER
     slopes = u @ line.slopes.T
     # Slopes are usually largest at the ends, which Gauss points do not include.
-    ends = u @ (body.shape.slopes @ body.integrals.D).T
+    ends = u @ line.ends.T
     slope = np.maximum(np.max(np.abs(slopes), axis=1, initial=0.0), np.max(np.abs(ends), axis=1, initial=0.0))
     shortening = axial = np.full(solution.t.size, np.nan)
     if line.weights.size:
         shortening = 0.5 * slopes**2 @ line.weights
-        # The body, held as by its frame, buckles under an axial force N, where 1 / N is the largest eigenvalue of
-        # W^-1 G W^-1, W = diag(omega), G = int slope^T slope dx: coordinates are modes of stiffness omega^2.
-        largest = np.linalg.norm(np.sqrt(line.weights)[:, None] * line.slopes / body.modes.omega, ord=2) ** 2
-        axial = _axial_force(system, body, line, solution) / (1.0 / largest if largest > 0.0 else np.inf)
+        axial = _axial_force(system, body, line, solution) / line.buckling
     whole = system.carrier(name)[0]
     return Bending(whole, len(system.parts(whole)), body.points is None, given, tangent, slope, shortening, axial)
 
 
 class _Line(NamedTuple):
-    """Stations along a body: weights of an integral over its length [m], slopes and strains per coordinate, E A [N]."""
+    """Stations along a body: weights of an integral over its length [m], slopes and strains per coordinate, E A [N].
+
+    With them are slopes at its ends and nodes, and its buckling load [N].
+    """
 
     weights: Array
     slopes: Array
     strains: Array
     stiffness: Array
+    ends: Array
+    buckling: float
 
 
 def _line(body: BodyCoordinates, described: Body) -> _Line:
@@ -89,20 +93,24 @@ def _line(body: BodyCoordinates, described: Body) -> _Line:
         mesh, spans = described.mesh, described.spans
         lengths = np.diff(mesh.nodes)
         weights = (0.5 * lengths[:, None] * GAUSS_WEIGHTS).ravel()
-        stretch = np.diff(D[mesh.rows_of(AXIAL)], axis=0) / lengths[:, None]
-        stiffness = np.array([spans[span].axial_stiffness for span in mesh.spans])
         each = np.repeat(np.arange(lengths.size), GAUSS_POINTS)
+        strains = (np.diff(D[mesh.rows_of(AXIAL)], axis=0) / lengths[:, None])[each]
+        stiffness = np.array([spans[span].axial_stiffness for span in mesh.spans])[each]
         slopes = mesh.transverse_at(GAUSS_FRACTIONS, 1).reshape(each.size, -1) @ D
-        return _Line(weights, slopes, stretch[each], stiffness[each])
-    if isinstance(described, AssumedModesBeam):
+    elif isinstance(described, AssumedModesBeam):
         shapes = described.shapes
         x, weights = shapes.quadrature()
         bent = len(shapes.transverse)
         slopes = shapes.transverse_rows(x, derivative=1) @ D[:bent]
         strains = shapes.axial_rows(x, derivative=1) @ D[bent:]
-        stiffness = span_properties(described.section, described.material).axial_stiffness
-        return _Line(weights, slopes, strains, np.full(x.size, stiffness))
-    return _Line(np.zeros(0), np.zeros((0, body.nf)), np.zeros((0, body.nf)), np.zeros(0))
+        stiffness = np.full(x.size, span_properties(described.section, described.material).axial_stiffness)
+    else:
+        weights, stiffness, slopes, strains = np.zeros(0), np.zeros(0), np.zeros((0, body.nf)), np.zeros((0, body.nf))
+    # The body, held as by its frame, buckles under an axial force N, where 1 / N is the largest eigenvalue of
+    # W^-1 G W^-1, W = diag(omega), G = int slope^T slope dx: coordinates are modes of stiffness omega^2.
+    largest = np.linalg.norm(np.sqrt(weights)[:, None] * slopes / body.modes.omega, ord=2) ** 2 if weights.size else 0.0
+    buckling = float(1.0 / largest) if largest > 0.0 else np.inf
+    return _Line(weights, slopes, strains, stiffness, body.shape.slopes @ D, buckling)
 
 
 def _axial_force(system: System, body: BodyCoordinates, line: _Line, solution: Solution) -> Array:
