@@ -12,14 +12,11 @@ def task():
     return pf.plan(arm, pf.load("raparm_i").paths["square"], duration=0.7)
 
 
-# Without learned weights, by polynomials through three stages, these are 2.5 and 1.8; here 2.04 and 1.43.
-@pytest.mark.parametrize(
-    ("method", "step", "stages", "most"), [("esdirk5", 1.5e-3, 6, 2.25), ("tr-bdf2", 2.5e-4, 2, 1.6)]
-)
-def test_learned_guesses_save_iterations(task, method, step, stages, most):
-    options = pf.IntegrationOptions(method=method, step=step, tolerance=1e-3)
+def test_learned_guesses_save_iterations(task):
+    """By polynomials through three stages it takes 2.4 iterations a stage; here 2.0."""
+    options = pf.IntegrationOptions(method="esdirk5", step=1.5e-3, tolerance=1e-3)
     solution = task.simulate("++++", options=options).solution
-    assert solution.newton_iterations < most * stages * solution.steps
+    assert solution.newton_iterations < 2.2 * 6 * solution.steps
 
 
 def test_guesses_do_not_change_a_run_beyond_the_tolerance_of_the_iteration(task):

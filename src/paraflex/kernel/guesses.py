@@ -37,8 +37,8 @@ def note_inertias(system, march):
 def guess(i, place, h, learns, singular, tableau, march):
     """Guess accelerations and multipliers of stage i, at `place` steps after the start of a step of size h.
 
-    `learns` is whether weights are learned: see `learn`. Near a `singular` position multipliers have a pole, and the
-    nearest ones are taken.
+    `learns` is whether weights are learned. Near a `singular` position multipliers have a pole, and the nearest ones
+    are taken.
     """
     if learns and not singular and are_similar(h, march):
         found = nearest_stages(i, place, 1.0, GUESS_FROM, tableau, march)
@@ -150,10 +150,7 @@ def fit(i, found, march):
 
 @routine
 def learn(i, place, h, tableau, march):
-    """Add the solution of stage i to the sums of which `fit` computes weights; see `guess` for place and h.
-
-    In the Newmark family, and in schemes of three stages with varying steps, this saves no iterations.
-    """
+    """Add the solution of stage i to the sums of which `fit` computes weights; see `guess` for place and h."""
     if not are_similar(h, march):
         return
     found = nearest_stages(i, place, 1.0, GUESS_FROM, tableau, march)
