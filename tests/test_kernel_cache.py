@@ -225,7 +225,8 @@ def test_an_interrupt_waits_until_a_kernel_is_loaded(monkeypatch):
 
 @pytest.mark.skipif(binding.get_process_triple().split("-")[0] != "x86_64", reason="levels of x86-64")
 def test_processors_of_a_level_share_kernels_and_others_have_their_own(monkeypatch):
-    monkeypatch.setitem(vars(config), "CPU_NAME", None)
+    for setting in ("CPU_NAME", "CPU_FEATURES"):
+        monkeypatch.setitem(vars(config), setting, None)
     level = dict.fromkeys(("avx2", "bmi", "bmi2", "f16c", "fma", "lzcnt", "movbe"), True)
     found = []
     for name, features in (("znver4", level | {"avx512f": True}), ("haswell", level), ("nehalem", {"sse4.2": True})):

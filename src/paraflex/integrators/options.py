@@ -93,8 +93,8 @@ class IntegrationOptions(CheckedFields):
         default ten million; a run then also ends if it has become a hundred times slower than before and would need
         more than a million steps.
     newton_fraction : float, optional
-        Part of the error allowed in a step that Newton's iteration may leave; the method's own by default, that of
-        TR-BDF2 smaller in fixed steps.
+        Part of the error allowed in a step that Newton's iteration may leave; the method's own by default, which is
+        smaller in fixed steps.
     events : tuple of JointLimit, DeflectionLimit or SingularDistance
         Events, the first of which ends the run. An excursion across a limit and back within a quarter of a step is
         missed: limit the step size if limits are grazed.

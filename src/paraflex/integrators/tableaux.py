@@ -130,7 +130,7 @@ class HighOrderESDIRK(ESDIRK):
     """Scheme of order three or more, whose error estimate is small beside what Newton's iteration may leave."""
 
     newton_fraction: ClassVar[float] = 3e-3
-    fixed_newton_fraction: ClassVar[float] = 3e-3
+    fixed_newton_fraction: ClassVar[float] = 1e-3
 
 
 class ESDIRK3(HighOrderESDIRK):

@@ -27,7 +27,7 @@ from .stage import CONVERGED, SINGULAR, SLOW, WORST_CONTRACTION, place, solve_st
 # A new factor costs about as much as this many iterations, so it pays once the old one has cost as many more. In
 # second-order geometry it costs more.
 FACTOR_COST, BENT_FACTOR_COST = 2, 3
-# Schemes of more stages learn the weights of their guesses; others need no fewer iterations for it.
+# With flexible bodies, schemes of more stages learn the weights of their guesses; others need no fewer iterations so.
 LEARN_FROM = 3
 # Number of steps that get a new factor each, after a factor that cost that much in its second step.
 IMPATIENCE = 20
@@ -173,7 +173,7 @@ def attempt(system, signals, tableau, controls, t, h, march, work, slow):
             newton_tolerance, force_tolerance * force / system.total_mass * max(b, g * newton_memory)
         )
     before = march.counts[at.ITERATIONS]
-    learns = stages > LEARN_FROM
+    learns = stages > LEARN_FROM and system.modal.shape[1] > 0
     i, rounds, held = 1, 0, 0.0
     while i < stages:
         if not one_stage:
