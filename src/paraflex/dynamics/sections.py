@@ -261,9 +261,9 @@ def _stations(described: FlexibleBeam | AssumedModesBeam, system: System) -> _Be
         mesh = described.mesh
         pieces = max(_ELEMENT_PIECES, -(-_BEAM_PIECES // mesh.n_elements))
         at = np.linspace(0.0, 1.0, pieces + 1).tolist()
-        # Equal beams share integrals and with them these rows.
-        rows = system.once(("section rows", id(body.integrals)), lambda: _rows(described, body, at))
-        return _with_bars(described, body, at, rows)._replace(contacts=contacts_of(system, described))
+        # Equal beams share integrals and with them all but what their strength depends on.
+        part = system.once(("stations", id(body.integrals)), lambda: _meshed(described, body, at))
+        return part._replace(body=body.name, bars=_bars(described, len(at)), contacts=contacts_of(system, described))
     pieces = max(_BEAM_PIECES, _ELEMENT_PIECES * described.shapes.count)
     return _assumed(described, body, np.linspace(0.0, 1.0, pieces + 1) * described.length)
 
@@ -280,29 +280,8 @@ def _assumed(described: AssumedModesBeam, body: BodyCoordinates, x: Array) -> _B
     return _Beam(body.name, x, [(described.section, described.material)] * x.size, moment, force)
 
 
-def _meshed(beam: FlexibleBeam, body: BodyCoordinates, fractions: Sequence[float], which: slice) -> _Beam:
-    """Return the data of a beam at fractions of some of its elements, without contacts."""
-    return _with_bars(beam, body, fractions, _rows(beam, body, fractions, which), which)
-
-
-def _with_bars(
-    beam: FlexibleBeam, body: BodyCoordinates, fractions: Sequence[float], rows: tuple[Array, Array | None],
-    which: slice = slice(None),
-) -> _Beam:  # fmt: skip
-    """Return the data of a beam at fractions of its elements from the rows of `_rows`, without contacts."""
-    mesh = beam.mesh
-    sections = per_span(beam.section, mesh.n_spans, "section")
-    materials = per_span(beam.material, mesh.n_spans, "material")
-    elements = np.arange(mesh.n_elements)[which]
-    x = mesh.nodes[elements, None] + np.array(fractions) * np.diff(mesh.nodes)[elements, None]
-    owners = mesh.spans[np.repeat(elements, len(fractions))]
-    return _Beam(body.name, x.ravel(), [(sections[span], materials[span]) for span in owners], *rows)
-
-
-def _rows(
-    beam: FlexibleBeam, body: BodyCoordinates, fractions: Sequence[float], which: slice = slice(None)
-) -> tuple[Array, Array | None]:
-    """Return `_Beam.moment` and `_Beam.force` at fractions of the elements of a beam, or of some of them."""
+def _meshed(beam: FlexibleBeam, body: BodyCoordinates, fractions: Sequence[float], which: slice = slice(None)) -> _Beam:
+    """Return the data of a beam at fractions of its elements, or of some of them, without contacts."""
     mesh, D, spans = beam.mesh, body.integrals.D, beam.spans
     elements, count = np.arange(mesh.n_elements)[which], len(fractions)
     first, last = (mesh.shape_at_node(node)[0][0] @ D for node in (0, mesh.n_elements))
@@ -314,12 +293,23 @@ def _rows(
     z = np.array(fractions) * lengths[elements, None]
     curvature = mesh.transverse_at(fractions, 2)[which] @ D
     resisted = piece_rows(inertia_moments(beam, body), np.repeat(elements, count), z.ravel())
-    moment = np.hstack([(bend[elements, None, None] * curvature).reshape(z.size, -1), resisted])
+    part = _Beam(
+        body.name, (mesh.nodes[elements, None] + z).ravel(), _bars(beam, count, which),
+        np.hstack([(bend[elements, None, None] * curvature).reshape(z.size, -1), resisted]), None,
+    )  # fmt: skip
     if not _stretches(body, last - first, np.sum(lengths / stretch)):
-        return moment, None
+        return part
     strain = stretch[elements, None, None] * (mesh.axial_at(fractions, 1)[which] @ D)
     change = (mass[elements, None, None] * _change(mesh, D, fractions)[which]).reshape(z.size, -1)
-    return moment, np.hstack([strain.reshape(z.size, -1), change])
+    return part._replace(force=np.hstack([strain.reshape(z.size, -1), change]))
+
+
+def _bars(beam: FlexibleBeam, count: int, which: slice = slice(None)) -> list[tuple[Section, Material]]:
+    """Return section and material of a beam at so many places of each element, or of some of them."""
+    mesh = beam.mesh
+    sections = per_span(beam.section, mesh.n_spans, "section")
+    materials = per_span(beam.material, mesh.n_spans, "material")
+    return [(sections[span], materials[span]) for span in np.repeat(mesh.spans[which], count)]
 
 
 def _stretches(body: BodyCoordinates, lengthened: Array, flexibility: float) -> bool:

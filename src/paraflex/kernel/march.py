@@ -89,7 +89,6 @@ def begin(system, signals, controls, march, work):
     """Compute the first stage of a run, or after a jump."""
     t = march.clock[at.TIME]
     march.counts[at.JUMPED] = 0
-    note_inertias(system, march)
     first_stage(system, signals, t, controls, march, work)
     a, lam = march.stage_a[1, 0], march.stage_lam[1, 0]
     # Starting guesses must not extrapolate across a jump: stages before it do not count as other times.
@@ -129,6 +128,7 @@ def resume(system, signals, controls, march, work, aside):
 @kernel
 def start(system, signals, controls, march, work, out):
     """Compute the first stage and the first sample of a run."""
+    note_inertias(system, march)
     begin(system, signals, controls, march, work)
     t, a, lam = march.clock[at.TIME], march.stage_a[1, 0], march.stage_lam[1, 0]
     kinetic, strain, march.clock[at.WEIGHT_0] = stored_energy(system, march.q, march.v, lam, work.scratch)

@@ -9,7 +9,7 @@ from .vectors import LANES
 
 # Largest number of singular positions recorded in a run.
 MOST_PASSAGES = 1000
-# Largest number of stages that the guess of the next stage is made of.
+# Largest number of stages that the guess of the next stage is made of; `guesses.learn` has a sum for each.
 GUESS_FROM = 6
 # Return codes of `march`.
 PAUSED, FINISHED, NO_CONVERGENCE, NOT_FINITE, ERROR_TEST = range(5)
