@@ -28,7 +28,7 @@ from paraflex.studies.html import indices_html, search_html
 from paraflex.studies.optimisation.identify import IdentificationResult, TargetResult
 from paraflex.studies.optimisation.indices import IndicesResult
 from paraflex.studies.optimisation.objective import Target
-from paraflex.studies.sensitivities.study import Sensitivities
+from paraflex.studies.sensitivity import Sensitivities
 
 _EMPTY = {"circle", "path", "rect", "br", "polygon", "polyline"}
 EVIL = '<script>alert("x")</script> & co'

@@ -12,7 +12,7 @@ import threading
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import BrokenExecutor, CancelledError, Executor, Future, ProcessPoolExecutor, ThreadPoolExecutor
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 from importlib import import_module
 from itertools import chain, islice
 from queue import Empty, SimpleQueue
@@ -402,18 +402,35 @@ def _each(function: Callable[..., R], tasks: Iterable[T], *more: object) -> tupl
 
 def share_out(calls: Sequence[Callable[[], object]]) -> None:
     """Make independent calls that write files, in forked copies of this process unless it has several threads."""
+    with sharing_out(calls) as finish:
+        finish()
+
+
+@contextmanager
+def sharing_out(calls: Sequence[Callable[[], object]]) -> Iterator[Callable[[], None]]:
+    """Make calls as `share_out` does while the block runs, which calls the function yielded to wait for them."""
     left = set(range(len(calls)))
+
+    def make() -> None:
+        for k in sorted(left):
+            calls[k]()
+
     # Threads may hold locks, and libraries of macOS do not survive a fork.
-    if len(calls) > 1 and sys.platform == "linux" and threading.active_count() == 1:
-        _shared[:], watched = calls, Calls()
-        with Processes(min(len(calls), _processors()), copies=True) as engine:
-            number = {watched.submit(_submit, engine, _make, k): k for k in left}
+    if len(calls) < 2 or sys.platform != "linux" or threading.active_count() > 1:
+        yield make
+        return
+    _shared[:], watched = calls, Calls()
+    with Processes(min(len(calls), _processors()), copies=True) as engine:
+        number = {watched.submit(_submit, engine, _make, k): k for k in left}
+
+        def finish() -> None:
             while not all(one.done() for one in number):
                 watched.done()
-            left -= {k for one, k in number.items() if not one.exception() and one.result()}
-        _shared.clear()
-    for k in sorted(left):
-        calls[k]()
+            left.difference_update(k for one, k in number.items() if not one.exception() and one.result())
+            make()
+
+        yield finish
+    _shared.clear()
 
 
 def _make(k: int) -> bool:

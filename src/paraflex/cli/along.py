@@ -2,7 +2,7 @@
 
 import time
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass
 from functools import partial
 from typing import Any
@@ -27,7 +27,7 @@ from paraflex.tracking import TrackingRun, TrackingTask, simulate
 from .bars import bars
 from .collected import apart, collected
 from .commands.runs import RunRequest
-from .ending import exit_code, print_results, where, write_drawn, write_numbers
+from .ending import drawing, exit_code, print_results, where, write_numbers
 from .integration import kept_coordinates, locating_reduction, run_parameters
 from .request import acting_controllers, command_provenance, controller_arguments, located_error, plan_study
 from .run_lines import failures, print_runs
@@ -132,14 +132,17 @@ def _run(request: RunRequest, model: Model, planned: Sequence[_Along], fidelity:
     try:
         for along in planned:
             with apart():
-                result, numbers[along.path] = _simulated(console, model, along)
-                done[along.path] = result
-                if result.data is not None:
-                    if alone:
-                        print_results(numbers[along.path], show, as_json=request.json)
-                    else:
+                result, plain = _simulated(console, model, along)
+                with _drawing(console, request, along, result):
+                    if result.data is not None:
+                        write_numbers(result.data, plain, along.folder)
+                    done[along.path], numbers[along.path] = result, plain
+                    if result.data is not None and alone:
+                        print_results(plain, show, as_json=request.json)
+                    elif result.data is not None:
                         warn_of(PlainConsole(stderr=request.json), verdict_of(result.data), along.whose)
-                    places.append(_draw(console, request, along, result, began))
+                if result.data is not None:
+                    places.append(where(began, "results", along.folder.path, request.drawn))
             if result.interrupted:
                 break
             began = time.perf_counter()
@@ -153,10 +156,7 @@ def _run(request: RunRequest, model: Model, planned: Sequence[_Along], fidelity:
 
 
 def _simulated(console: PlainConsole, model: Model, along: _Along) -> tuple[StudyResult, dict[str, Any]]:
-    """Run all modes along a path and write their results, returned also as plain values.
-
-    Nothing is written if no mode could start.
-    """
+    """Run all modes along a path, and return their results, also as plain values."""
     try:
         with _progress(console, along) as report:
             result = along.study.run(on_progress=report)
@@ -165,20 +165,17 @@ def _simulated(console: PlainConsole, model: Model, along: _Along) -> tuple[Stud
         raise located_error(error, model) from None
     if result.data is None:
         warn_of(console, collected(along.study.findings), along.whose)
-        failures(console, result, along.whose)
-        return result, result.to_dict()
-    keep_findings(result.data, collected(verdict_of(result.data)))
-    numbers = result.to_dict()
-    write_numbers(result.data, numbers, along.folder)
-    return result, numbers
+    else:
+        keep_findings(result.data, collected(verdict_of(result.data)))
+    return result, result.to_dict()
 
 
-def _draw(console: PlainConsole, request: RunRequest, along: _Along, result: StudyResult, began: float) -> str:
-    """Add figures and report to the numbers, and print which modes failed; return a line with time and folder."""
-    assert result.data is not None
+@contextmanager
+def _drawing(console: PlainConsole, request: RunRequest, along: _Along, result: StudyResult) -> Iterator[None]:
+    """Draw while the block writes the numbers, unless no mode could start, and print which modes failed."""
     try:
-        write_drawn(result.data, along.folder, request.drawn)
-        return where(began, "results", along.folder.path, request.drawn)
+        with nullcontext() if result.data is None else drawing(result.data, along.folder, request.drawn):
+            yield
     finally:
         failures(console, result, along.whose)
 

@@ -2,14 +2,14 @@
 
 import json
 import time
-from collections.abc import Callable, Iterable, Mapping
-from contextlib import nullcontext
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import ExitStack, contextmanager, nullcontext
 from pathlib import Path
 from typing import Any
 
 import xarray as xr
 
-from paraflex.campaign.workers import share_out
+from paraflex.campaign.workers import sharing_out
 from paraflex.errors import OutputError
 from paraflex.findings import Finding
 from paraflex.folders import RESULT_KINDS, ResultsFolder
@@ -74,24 +74,40 @@ def write_numbers(data: xr.Dataset, summary: dict[str, Any], folder: ResultsFold
 
 def write_drawn(results: xr.Dataset | Mapping[str, Any], folder: ResultsFolder, drawn: DrawnChoice = _FIGURES) -> None:
     """Add figures, and the report of a dataset, to results already written, which an interruption leaves intact."""
-    try:
-        with folder.added_files() as new:
-            calls: list[Callable[[], object]] = []
-            if drawn.report and isinstance(results, xr.Dataset):
-                from .report import page_of, save_page  # its import takes a second
+    with drawing(results, folder, drawn):
+        pass
 
-                calls.append(lambda: save_page(page_of(results, folder.path), new / "report.html"))
-            if drawn.figures:
-                from paraflex.plots.save import figure_calls  # as does this one
 
-                calls += figure_calls(results, new / "figures")
-            share_out(calls)
-    except KeyboardInterrupt as interrupt:
-        interrupt.args = (f"the numbers are in {folder.path}; {_LATER}",)
-        raise
-    except OutputError as error:
-        remedy = f"the numbers are in {folder.path}: once there is room, {_LATER}"
-        raise OutputError(error.problem, field=error.field, remedy=remedy) from error
+@contextmanager
+def drawing(
+    results: xr.Dataset | Mapping[str, Any], folder: ResultsFolder, drawn: DrawnChoice = _FIGURES
+) -> Iterator[None]:
+    """Draw figures while the block writes the results, then add them, and the report of a dataset, to the results."""
+    with ExitStack() as stack:
+        place, finish = folder.path, None
+        if drawn.figures:
+            from paraflex.plots.save import figure_calls  # its import takes a second
+
+            place = stack.enter_context(folder.drawn_files())
+            finish = stack.enter_context(sharing_out(figure_calls(results, place / "figures")))
+        yield
+        try:
+            with folder.added_files() as new:
+                if drawn.report and isinstance(results, xr.Dataset):
+                    from .report import page_of, save_page  # as does this one
+
+                    save_page(page_of(results, folder.path), new / "report.html")
+                if finish is not None:
+                    finish()
+                    if (place / "figures").exists():
+                        (place / "figures").replace(new / "figures")
+        except KeyboardInterrupt as interrupt:
+            interrupt.args = (f"the numbers are in {folder.path}; {_LATER}",)
+            raise
+        except OutputError as error:
+            field = error.field.replace(str(place), str(folder.path))
+            remedy = f"the numbers are in {folder.path}: once there is room, {_LATER}"
+            raise OutputError(error.problem, field=field, remedy=remedy) from error
 
 
 def give_dataset(
@@ -125,8 +141,8 @@ def give_dataset(
         numbers = summary(data)
         print_results(numbers, lambda out: show(out, data), as_json=chosen.json, findings=findings)
         if folder is not None:
-            write_numbers(data, numbers, folder)
-            write_drawn(data, folder, chosen.drawn)
+            with drawing(data, folder, chosen.drawn):
+                write_numbers(data, numbers, folder)
     if folder is not None:
         print_location(began, "numbers", folder.path, chosen.drawn, as_json=chosen.json)
     return data

@@ -31,7 +31,7 @@ from .bars import late_bar
 from .collected import collected
 from .commands.options import PlanChoice
 from .commands.runs import RunRequest
-from .ending import exit_code, print_location, print_results, write_drawn, write_numbers
+from .ending import drawing, exit_code, print_location, print_results, write_numbers
 from .integration import kept_coordinates, locating_reduction, run_parameters
 from .replacing import hold_results
 from .request import acting_controllers, command_provenance, controller_arguments, locating_errors
@@ -96,11 +96,11 @@ def run_motion(request: RunRequest, model: Model, mechanism: Mechanism, options:
             sizes = [size_of(one.system, _first(one)) for one in (run, full)]
             data = compared_with_full(data, motion_dataset(full, options=options), *sizes)
         summary = motion_summary(data)
-        write_numbers(data, summary, folder)
-        print_results(summary, lambda out: _report(out, summary), as_json=request.json)
         finished, interrupted = run.solution.status in DONE_STATUSES, run.solution.status == "interrupted"
         try:
-            write_drawn(data, folder, request.drawn)
+            with drawing(data, folder, request.drawn):
+                write_numbers(data, summary, folder)
+                print_results(summary, lambda out: _report(out, summary), as_json=request.json)
         finally:
             if not finished:
                 message = run.solution.message

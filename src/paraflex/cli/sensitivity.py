@@ -9,7 +9,7 @@ from paraflex.figures.sensitivity import tables
 from paraflex.files.expressions import ExpressionError, evaluate
 from paraflex.folders import SENSITIVITY
 from paraflex.studies import load_sensitivities
-from paraflex.studies.sensitivities.study import FIGURES, LINES, TABLE
+from paraflex.studies.sensitivity import FIGURES, LINES, TABLE
 from . import COMPLETE
 from .commands.studies import SensitivityRequest
 from .ending import print_results, write_drawn

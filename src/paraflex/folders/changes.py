@@ -15,7 +15,7 @@ from paraflex.seals import damaged
 from paraflex.writing import ELSEWHERE, read_values, unwritable
 
 MANIFEST = "manifest.json"
-NEW, READY, REMOVED = ".new", ".ready", "removed.json"
+NEW, READY, DRAWN, REMOVED = ".new", ".ready", ".drawn", "removed.json"
 _NO_NAME = re.compile("[\0\ud800-\udfff]")  # file names contain no null character and no surrogate
 
 

@@ -16,7 +16,7 @@ from paraflex.errors import InputError, OutputError
 from paraflex.interrupts import uninterrupted
 from paraflex.seals import damaged
 from paraflex.writing import ELSEWHERE, read_json, unwritable, write_json
-from .changes import MANIFEST, NEW, READY, REMOVED, check_place, files_in, finish_moves, is_inside
+from .changes import DRAWN, MANIFEST, NEW, READY, REMOVED, check_place, files_in, finish_moves, is_inside
 from .kinds import FOLDER_FILES, STUDY_OF_RUNS
 from .lock import LOCK, FolderInUseError, finish_change, lock_folder
 
@@ -142,7 +142,7 @@ def foreign_files(folder: Path) -> list[str]:
     """Return the files of a folder not written by paraflex, except those in subfolders that hold other results."""
     ours = files_of(folder)
     inner = {name.partition("/")[0] for name in ours if "/" in name}
-    entries = [entry for entry in sorted(folder.iterdir()) if entry.name not in (MANIFEST, LOCK, NEW, READY)]
+    entries = [entry for entry in sorted(folder.iterdir()) if entry.name not in (MANIFEST, LOCK, NEW, READY, DRAWN)]
     found = [file for entry in entries if entry.name in inner for file in files_in(entry)]
     found += [entry for entry in entries if entry.name not in inner and not (entry.is_dir() and kind_of_folder(entry))]
     return [name for name in (each.relative_to(folder).as_posix() for each in found) if name not in ours]
@@ -256,6 +256,17 @@ class ResultsFolder:
             yield new
 
     @contextmanager
+    def drawn_files(self) -> Iterator[Path]:
+        """Yield a temporary folder for files drawn while results are written, from which they are moved afterwards."""
+        drawn = self.path / DRAWN
+        try:
+            drawn.mkdir(parents=True, exist_ok=True)
+            yield drawn
+        finally:
+            with uninterrupted():
+                shutil.rmtree(drawn, ignore_errors=True)
+
+    @contextmanager
     def _changed(self, is_replaced: Callable[[str], bool]) -> Iterator[Path]:
         new, ready = self.path / NEW, self.path / READY
         try:
@@ -332,7 +343,8 @@ def hold_folder(
                 )  # fmt: skip
             try:
                 with uninterrupted():  # otherwise an empty folder could remain
-                    shutil.rmtree(path / NEW, ignore_errors=True)
+                    for left in (NEW, DRAWN):
+                        shutil.rmtree(path / left, ignore_errors=True)
                     (path / NEW).mkdir()
                     (path / NEW).rmdir()
             except OSError as error:

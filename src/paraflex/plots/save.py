@@ -56,8 +56,9 @@ def save_figures(results: xr.Dataset | Mapping[str, Any], folder: str | Path, mo
 
 
 def figure_calls(results: xr.Dataset | Mapping[str, Any], folder: Path) -> list[Callable[[], object]]:
-    """Return a call for each figure of `save_figures`, which writes it."""
-    return [partial(_write_beside, [figure], folder) for figure in _accompanying(results, folder)]
+    """Return a call for each figure of `save_figures`, which writes it: first those of low panels, which have many."""
+    drawn = sorted(_accompanying(results, folder), key=lambda drawing: drawing.figure.height)
+    return [partial(_write_beside, [figure], folder) for figure in drawn]
 
 
 def _write_beside(drawn: Sequence[PlannedFigure], folder: Path) -> list[Path]:

@@ -20,7 +20,14 @@ _MOST_TILES = 2
 _MOST_ROWS_OF_MODES = 200
 
 
-def load_tables(data: xr.Dataset, selected: str = "") -> list[tuple[str, str]]:
+def loads_of_runs(data: xr.Dataset) -> dict[str, dict[str, Any]]:
+    """Return the results of `load_figures` by mode, "" for results without modes."""
+    if "mode" not in data.dims:
+        return {"": load_figures(data)}
+    return {mode: load_figures(data.sel(mode=mode)) for mode in names_of(data, "mode")}
+
+
+def load_tables(data: xr.Dataset, loads: Mapping[str, Mapping[str, Any]], selected: str = "") -> list[tuple[str, str]]:
     """Return titles and tables of controllers, stresses of beams, efforts of motors and drives, joints and ground.
 
     Results of earlier versions have none. Tables of motors and joints follow the mode selected on the page; a printed
@@ -30,12 +37,13 @@ def load_tables(data: xr.Dataset, selected: str = "") -> list[tuple[str, str]]:
     ----------
     data : xarray.Dataset
         Results of a run.
+    loads : mapping of str to mapping
+        Loads by mode; see `loads_of_runs`.
     selected : str
         Mode whose motors and joints are shown if those of all modes are too many; empty (default) without modes.
     """
-    modes = names_of(data, "mode") if "mode" in data.dims else [""]
+    modes = list(loads)
     runs = {mode: data.sel(mode=mode) if mode else data for mode in modes}
-    loads = {mode: load_figures(run) for mode, run in runs.items()}
     heads = ["mode"] if len(modes) > 1 else []
     out = sections([
         controller_table({(mode,): controller_figures(run) for mode, run in runs.items()}, heads),

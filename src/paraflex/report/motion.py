@@ -1,7 +1,9 @@
 """Report of a run without a path."""
 
 import json
+from collections.abc import Mapping
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -15,10 +17,9 @@ from paraflex.findings import DONE_STATUSES
 from paraflex.formatting import number, peak, quantity, text_symbol, typeset
 from paraflex.results.findings import finished, validity_line, validity_summary
 from paraflex.results.kinds import check_kind
-from paraflex.results.loads import load_figures
 from .film import NO_SHAPES, animation
 from .kind_page import kind_page
-from .loads import load_tables, load_tiles
+from .loads import load_tables, load_tiles, loads_of_runs
 from .page import Page
 from .provenance import common_facts
 from .text import pairs, sections, table_pairs
@@ -29,15 +30,15 @@ def motion_page(data: xr.Dataset) -> Page:
     """Return the report of a run, a dataset from `results.motion_dataset`."""
     check_kind(data, "motion")
     data = data.transpose("time", ...)
-    page, status = kind_page(data), str(data["status"].item())
+    page, status, loads = kind_page(data), str(data["status"].item()), loads_of_runs(data)
     return replace(
         page,
         kind="run",
         subtitle=_subtitle(data),
         facts=common_facts(data),
-        figures=_figures(data),
+        figures=_figures(data, loads),
         more=[
-            *load_tables(data),
+            *load_tables(data, loads),
             *sections(reduced_runs(data)),
             ("Integration", _table(data)),
         ],
@@ -76,8 +77,8 @@ def _torque(values: xr.DataArray) -> str:
     return typeset(f"{number(float(values.min()))} to {number(float(values.max()))} N m")
 
 
-def _figures(data: xr.Dataset) -> list[tuple[str, str, str]]:
-    tiles = load_tiles({"": load_figures(data)})
+def _figures(data: xr.Dataset, loads: Mapping[str, Mapping[str, Any]]) -> list[tuple[str, str, str]]:
+    tiles = load_tiles(loads)
     if body := most_bent(data):
         tiles.append(("largest deflection", quantity(peak(deflections_of(data)), "m"), text_symbol(body)))
     status = str(data["status"].item())

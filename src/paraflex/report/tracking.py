@@ -18,10 +18,9 @@ from paraflex.formatting import number, peak, quantity
 from paraflex.results.findings import finished, validity_line, validity_summary
 from paraflex.results.following import headline
 from paraflex.results.kinds import check_kind
-from paraflex.results.loads import load_figures
 from .film import NO_SHAPES, animation
 from .kind_page import kind_page
-from .loads import load_tables, load_tiles
+from .loads import load_tables, load_tiles, loads_of_runs
 from .page import Page
 from .provenance import asked, common_facts, model_words, summary_beside, verdict_word
 from .text import sections
@@ -50,7 +49,7 @@ def tracking_page(data: xr.Dataset, failed: Mapping[str, str] | None = None) -> 
     check_kind(data, "tracking")
     data = data.transpose("mode", "time", ...)
     runs, rows = names_of(data, "mode"), Runs({"": data}, {"": list(failed or {})})
-    page, run = kind_page(data), asked(data)
+    page, run, loads = kind_page(data), asked(data), loads_of_runs(data)
     path = run.get("path")
     modes = f"{len(runs)} actuation modes" if len(runs) > 1 else f"actuation mode {runs[0]}"
     # The validity is that of complete runs only.
@@ -62,10 +61,10 @@ def tracking_page(data: xr.Dataset, failed: Mapping[str, str] | None = None) -> 
         subtitle=", ".join([f"path “{path}”", modes] if path else [modes]),
         verdict=verdict_word(data, failed or {}),
         facts=[*([("model", model_words(run))] if run else []), *_after(data), *common_facts(data)],
-        figures=_figures(data),
+        figures=[*_figures(data), *load_tiles(loads)],
         more=[
             *sections([result_table(rows), after_table(rows)]),
-            *load_tables(data, default_mode(data)),
+            *load_tables(data, loads, default_mode(data)),
             *sections(reduced_runs(data)),
             *sections([solver_table(rows)]),
         ],
@@ -102,7 +101,7 @@ def _figures(data: xr.Dataset) -> list[tuple[str, str, str]]:
         if np.isfinite(known).any():
             run = int(choose(known))
             tiles.append((name, quantity(known[run], unit), f"mode {data['mode'].values[run]}"))
-    return [*tiles, *load_tiles({name: load_figures(data.sel(mode=name)) for name in names_of(data, "mode")})]
+    return tiles
 
 
 def _broken_off(data: xr.Dataset, whole: Mask) -> tuple[str, str, str]:

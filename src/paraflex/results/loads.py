@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from paraflex.arrays import Mask
+from paraflex.arrays import Array, Mask
 from paraflex.findings import RESOLVED
 from paraflex.formatting import display_unit, error_text, number, quantity, speed_text
 from paraflex.units import EFFORTS, RATES
@@ -15,8 +15,6 @@ from .numbers import finite_or_none, largest, units_of_each
 Figures = dict[str, float | str | None]
 # Variables of beams, and the keys that differ from their names.
 OF_BEAMS = ("stress_max", "stress_place", "stress_time", "bending_stress_max", "axial_stress_max", "safety_factor")
-# Variables of joints; those of vectors may have an error.
-_OF_JOINTS = ("joint_coordinate", "joint_speed", "joint_force", "joint_moment")
 _NAMES = {"stress_place": "place", "stress_time": "time", "stress_max_error": "stress_error"}
 
 
@@ -49,29 +47,30 @@ def load_figures(run: xr.Dataset) -> dict[str, Any]:
             if body in bent or np.isfinite(run["stress_max"].values[b])
         }
     if "joint_coordinate" in run:
-        # Selecting one joint of all variables would take most of the time.
-        few = run[[name for name in run.data_vars if str(name).removesuffix("_error") in _OF_JOINTS]]
+        parts = [_most(name, run, f"joint_{name}", "joint") for name in ("speed", "force", "moment")]
+        coordinates = run["joint_coordinate"].transpose("joint", ...).values
         out["joints"] = {
-            str(joint): _joint(few.sel(joint=joint), slides=slides)
-            for joint, slides in zip(run["joint"].values, sliding_joints(run), strict=True)
+            str(joint): _travel(values, slides=slides) | speed | force | moment
+            for joint, values, slides, speed, force, moment in zip(
+                run["joint"].values, coordinates, sliding_joints(run), *parts, strict=True
+            )
         }
     for group, dim, torque in (
         ("motors", "motor", "torque" if "torque" in run else "applied_torque"), ("drives", "drive", "drive_torque"),
     ):  # fmt: skip
         if torque in run and f"{dim}_energy" in run:
+            named = (("torque", torque), ("speed", f"{dim}_speed"), ("power", f"{dim}_power"))
+            parts = [_most(name, run, variable, dim) for name, variable in named]
             out[group] = {
-                str(name): {
-                    "torque_unit": unit,
-                    "speed_unit": None if unit is None else RATES[unit],
-                    **_most("torque", run, torque, {dim: name}),
-                    **_most("speed", run, f"{dim}_speed", {dim: name}),
-                    **_most("power", run, f"{dim}_power", {dim: name}),
-                    "energy": finite_or_none(run[f"{dim}_energy"].sel({dim: name}).item()),
-                }
-                for name, unit in zip(run[dim].values, _units(run[torque], run.sizes[dim]), strict=True)
-            }
+                str(name): {"torque_unit": unit, "speed_unit": None if unit is None else RATES[unit]}
+                | most | speed | power | {"energy": finite_or_none(energy)}
+                for name, unit, energy, most, speed, power in zip(
+                    run[dim].values, _units(run[torque], run.sizes[dim]), run[f"{dim}_energy"].values, *parts,
+                    strict=True,
+                )
+            }  # fmt: skip
     if "frame_force" in run:
-        out["frame"] = _most("force", run, "frame_force") | _most("moment", run, "frame_moment")
+        out["frame"] = _most("force", run, "frame_force")[0] | _most("moment", run, "frame_moment")[0]
     return out
 
 
@@ -81,17 +80,24 @@ def sliding_joints(data: xr.Dataset) -> Mask:
     return np.asarray(known.reshape(-1, known.shape[-1]).any(axis=0))
 
 
-def _most(name: str, run: xr.Dataset, variable: str, place: Mapping[str, str] | None = None) -> Figures:
-    """Return the largest magnitude of numbers or vectors, its time (None for a constant), and its error if known."""
-    values = run[variable].sel(place)
-    sizes = values.reduce(np.linalg.norm, "axis") if "axis" in values.dims else abs(values)
-    most = largest(sizes.values)
-    when = None
-    if most is not None and "time" in sizes.dims:
-        when = float(sizes["time"].values[np.nanargmax(np.where(np.isfinite(sizes.values), sizes.values, np.nan))])
-    known = f"{variable}_error" in run
-    error = {f"{name}_error": finite_or_none(run[f"{variable}_error"].sel(place).item())} if known else {}
-    return {f"{name}_max": most, f"{name}_time": when, **error}
+def _most(name: str, run: xr.Dataset, variable: str, dim: str = "") -> list[Figures]:
+    """Return the largest magnitudes of the members of a dimension, or of the only one without it.
+
+    Each is that of numbers or vectors, with its time (None for a constant), and its error if known.
+    """
+    values = run[variable].transpose(dim, ...) if dim else run[variable].expand_dims("member")
+    sizes = np.linalg.norm(values, axis=values.get_axis_num("axis")) if "axis" in values.dims else np.abs(values.values)
+    times = run["time"].values if "time" in values.dims else None
+    errors = run[f"{variable}_error"].values.reshape(-1) if f"{variable}_error" in run else [None] * len(sizes)
+    out = []
+    for each, error in zip(sizes, errors, strict=True):
+        most = largest(each)
+        when = None
+        if times is not None and most is not None:
+            when = float(times[np.nanargmax(np.where(np.isfinite(each), each, np.nan))])
+        more = {} if error is None else {f"{name}_error": finite_or_none(error)}
+        out.append({f"{name}_max": most, f"{name}_time": when, **more})
+    return out
 
 
 def resolved_error(figures: Mapping[str, Any], load: str) -> float | None:
@@ -112,16 +118,12 @@ def _units(efforts: xr.DataArray, number: int) -> list[str | None]:
     return [unit if unit in RATES else None for unit in units_of_each(efforts, number)]
 
 
-def _joint(one: xr.Dataset, *, slides: bool) -> Figures:
-    values = one["joint_coordinate"].values
+def _travel(values: Array, *, slides: bool) -> Figures:
     known = values[np.isfinite(values)]
     return {
         "least": float(known.min()) if known.size else None,
         "most": float(known.max()) if known.size else None,
         "unit": "m" if slides else "rad",
-        **_most("speed", one, "joint_speed"),
-        **_most("force", one, "joint_force"),
-        **_most("moment", one, "joint_moment"),
     }
 
 

@@ -1,58 +1,8 @@
-"""Studies: sets of runs evaluated together and returned as one result."""
+"""Studies: sets of runs evaluated together and returned as one result.
 
-from paraflex.designs.derivatives.gradient import metric_gradients as metric_gradients
-from paraflex.designs.sweep import (
-    SweepResult as SweepResult,
-    SweepStudy as SweepStudy,
-    load_sweep as load_sweep,
-    sweep as sweep,
-)
-from .agreement import Refinement as Refinement, Verification as Verification, reference_model as reference_model
-from .cases import Case as Case, motion_case as motion_case, tracking_case as tracking_case
-from .compare import (
-    ComparisonOptions as ComparisonOptions,
-    ComparisonStudy as ComparisonStudy,
-    compare_methods as compare_methods,
-)
-from .comparison import Measurement as Measurement, MethodComparison as MethodComparison, Reference as Reference
-from .law_comparison import LawComparison as LawComparison
-from .laws import LawStudy as LawStudy, compare_laws as compare_laws
-from .optimisation.identify import (
-    IdentificationResult as IdentificationResult,
-    IdentificationStudy as IdentificationStudy,
-    identify as identify,
-    load_identification as load_identification,
-)
-from .optimisation.indices import (
-    IndicesResult as IndicesResult,
-    IndicesStudy as IndicesStudy,
-    indices as indices,
-    load_indices as load_indices,
-)
-from .optimisation.objective import Objective as Objective, Target as Target
-from .optimisation.optimise import (
-    OptimisationResult as OptimisationResult,
-    OptimisationStudy as OptimisationStudy,
-    load_optimisation as load_optimisation,
-    optimise as optimise,
-)
-from .optimisation.study import DesignStudy as DesignStudy
-from .sensitivities.study import (
-    Sensitivities as Sensitivities,
-    SensitivityStudy as SensitivityStudy,
-    load_sensitivities as load_sensitivities,
-    sensitivities as sensitivities,
-)
-from .tracking import (
-    Simulator as Simulator,
-    StudyResult as StudyResult,
-    TrackingStudy as TrackingStudy,
-    run_study as run_study,
-)
-from .verification import (
-    FIDELITIES as FIDELITIES,
-    VerificationOptions as VerificationOptions,
-    VerificationStudy as VerificationStudy,
-    check_model as check_model,
-    verify as verify,
-)
+Names are imported at their first use, so that one kind of study is run without importing the others.
+"""
+
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -17,7 +17,7 @@ from .comparison import MethodComparison
 from .law_comparison import LawComparison
 from .optimisation.indices import IndicesResult
 from .optimisation.result import SearchResult
-from .sensitivities.study import Sensitivities
+from .sensitivity import Sensitivities
 from .tracking import StudyResult
 
 

@@ -9,11 +9,9 @@ import numpy as np
 
 from paraflex.arguments import named_in_errors
 from paraflex.arrays import Array, Indices
-from paraflex.control.design.closed_loops import closed_loop, poles_beyond, unstable_poles
 from paraflex.control.laws.discrete import side_by_side
 from paraflex.errors import ParaflexError
 from paraflex.findings import Finding
-from paraflex.linear import linearise
 from paraflex.motion import MotionRun
 from paraflex.tracking import TrackingRun
 from .run_loop import ControllerRecord
@@ -160,6 +158,10 @@ def unstable_loop(run: ControlledTracking | ControlledMotion) -> tuple[Finding, 
     records = run.controllers
     if not records:
         return ()
+    # Runs without controllers do not need them.
+    from paraflex.control.design.closed_loops import closed_loop, poles_beyond, unstable_poles
+    from paraflex.linear import linearise
+
     laws = [one.linear for one in records]
     linear = [law for law in laws if law is not None]
     first = records[0]

@@ -1,1 +1,0 @@
-"""Sensitivity studies: derivatives of metrics with respect to numbers of the mechanism's file."""
