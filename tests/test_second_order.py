@@ -167,6 +167,42 @@ def test_forces_are_those_of_a_numerical_lagrangian(reference):
     assert np.max(np.abs(shape)) > 0.02 * np.max(np.abs(expected))
 
 
+def mass_point_forces(body, q, v, a):
+    """The forces of a body's inertia by the sum over its mass points, with the weights of f as they are."""
+    points, e = body.points, body.flexible
+    (w, dw), E = (v[body.angle], a[body.angle]), twins.E
+    turn = twins.rotation(q[body.angle])
+    slopes = points.slope[: points.weights.shape[1]]
+    s0, s1, s2 = (slopes @ x[e] for x in (q, v, a))
+    forces = np.zeros(3 + body.nf)
+    for k, weights in enumerate(points.weights):
+        shift = -0.5 * np.array([weights @ s0**2, 2.0 * weights @ (s0 * s1), 2.0 * weights @ (s1**2 + s0 * s2)])
+        s, ds, dds = (points.N[k] @ x[e] + [f, 0.0] for x, f in zip((q, v, a), shift, strict=True))
+        s = s + [points.x[k], 0.0]
+        relative = turn.T @ a[body.position] + dw * E @ s - w * w * s + 2.0 * w * E @ ds + dds
+        by_u = points.N[k] - np.outer([1.0, 0.0], (weights * s0) @ slopes)
+        rotary = points.inertia[k] * (dw + points.slope[k] @ a[e])
+        forces[:2] += points.mass[k] * turn @ relative
+        forces[2] += points.mass[k] * (E @ s) @ relative + rotary
+        forces[3:] += points.mass[k] * by_u.T @ relative + rotary * points.slope[k]
+    return forces
+
+
+@pytest.mark.parametrize("lumps", ["ABC", "AABBCCC", "C", ""])
+@pytest.mark.parametrize("elements", [(1, 1), (1, 2), (3, 4)])
+def test_elements_with_any_number_of_lumps_have_the_forces_of_their_mass_points(lumps, elements):
+    """More than two lumps do not fit into the vector of an element's Gauss points: it then has two vectors."""
+    masses = tuple(LumpedMass(point, 0.1 * k + 0.1, 1e-4 * k) for k, point in enumerate(lumps))
+    made = beam("one", lumps=masses, elements=elements, curvature=Curvature.SEPARATE)
+    system = build_system(dataclasses.replace(chain(), bodies=(made, *chain().bodies[1:])))
+    body, (q, v, a) = system.body("one"), random_state(system, 7)
+    f = np.zeros(system.n)
+    body_terms(system.packed, 0, q, v, a, f, make_scratch(system.packed))
+    expected = mass_point_forces(body, q, v, a)
+    expected[3:] += body.modes.omega**2 * q[body.flexible]
+    np.testing.assert_allclose(f[body.all], expected, rtol=0, atol=1e-11 * np.max(np.abs(expected)))
+
+
 def test_energy_is_that_of_the_points():
     system = build_system(chain())
     q, v, _ = random_state(system, 5)

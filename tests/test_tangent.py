@@ -23,7 +23,7 @@ from paraflex.kernel.ode import (
 from paraflex.kernel.packed import CONSTRAINT, FRICTION, OMEGA2
 from paraflex.kernel.stage import equations
 from paraflex.kernel.tangent import make_tangent, note_slopes, residual_tangent
-from paraflex.mechanism import AppliedTorque, Geometry, LinearSpring, PointForce, PointRef, raparm_i
+from paraflex.mechanism import AppliedTorque, Geometry, LinearSpring, LumpedMass, PointForce, PointRef, raparm_i
 from test_axes import make_sliders
 
 TIME, ALPHA, BETA, PART = 0.37, 3.0, 7.0, 1e-7
@@ -54,6 +54,13 @@ def mechanism(name):
     geometry = Geometry(geometry or "linear")
     if kind == "raparm":
         return raparm_i().with_geometry(geometry)
+    if kind == "lumps":
+        # More lumps at the end of every beam than fit beside its last element's Gauss points.
+        raparm = raparm_i().with_geometry(geometry)
+        more = {body.name: (LumpedMass(list(body.points)[-1], 0.1, 1e-4),) * 3 for body in raparm.bodies}
+        return replace(
+            raparm, bodies=tuple(replace(body, lumps=(*body.lumps, *more[body.name])) for body in raparm.bodies)
+        )
     if kind == "linkage":
         return loaded_linkage(geometry)
     if kind == "gears":
@@ -66,7 +73,7 @@ def mechanism(name):
 NAMES = [
     "raparm linear", "raparm second-order", "linkage linear", "linkage second-order", "gears linear",
     "gears second-order", "sliders linear", "sliders second-order",
-    "slider_crank_flexible", "3prr", "andrews",
+    "lumps second-order", "slider_crank_flexible", "3prr", "andrews",
 ]  # fmt: skip
 
 

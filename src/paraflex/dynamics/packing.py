@@ -7,11 +7,15 @@ from typing import Any
 import numpy as np
 
 from paraflex.arrays import Array, Indices, Records
+from paraflex.fem import MassPoints
 from paraflex.kernel.packed import (
     ANGLE,
     AXIS,
     AXIS_RECORD,
+    BASE,
     BODY,
+    FULL,
+    GAUSS,
     LINE,
     LOAD,
     MARKER,
@@ -23,7 +27,7 @@ from paraflex.kernel.packed import (
     PackedSystem,
 )
 from paraflex.kernel.sums import FIRST_MARKER
-from paraflex.kernel.vectors import padded
+from paraflex.kernel.vectors import LANES, padded
 from paraflex.mechanism import Joint, Mechanism, PointRef, TimeProfile
 from .constraints import Constraint, Term, coordinate
 from .coordinates import BodyCoordinates, Marker, PlacedBodies, transverse_pieces
@@ -76,12 +80,12 @@ def pack_system(placed: PlacedBodies, constraints: list[Constraint]) -> tuple[Pa
         # Per body: columns of G2 and of I2, one after the other (nf, 2 stride).
         products=_flat([np.hstack([_padded(b.integrals.G2.T), _padded(b.integrals.I2.T)]) for b in bodies]),
         bending=_flat([_padded(each) for each in bent]) if any(_is_full(body) for body in bodies) else None,
-        # All mass points of a body: Nx, Ny and N2' by coordinate (nf, 3 pitch); weights by Gauss point (slopes, pitch);
-        # position along the beam, mass and moment of inertia (3, pitch).
-        places=_flat([np.hstack([_padded(rows.T) for rows in (p.N[:, 0], p.N[:, 1], p.slope)]) for p in points]),
-        spans=_flat([_padded(p.weights.T) for p in points]),
-        weights=_flat([_padded(p.weights, p.mass.size) for p in points]),
-        inertias=_flat([_padded(np.stack([p.x, p.mass, p.inertia])) for p in points]),
+        # All mass points of a body: Nx, Ny and N2' by coordinate (nf, 3 pitch); position along the beam, mass and
+        # moment of inertia (3, pitch).
+        places=_flat([np.hstack([_in_lanes(rows, p).T for rows in (p.N[:, 0], p.N[:, 1], p.slope)]) for p in points]),
+        spans=_flat([spans for spans, _ in map(_weights_in_lanes, points)]),
+        weights=_flat([weights for _, weights in map(_weights_in_lanes, points)]),
+        inertias=_flat([_in_lanes(np.stack([p.x, p.mass, p.inertia], axis=1), p).T for p in points]),
         kinds=np.concatenate([numbers for each in kinds for numbers in each]),
         total_mass=np.sum([body.integrals.m for body in bodies]).item(),
         size=packer.size,
@@ -229,6 +233,35 @@ def _padded(matrix: Array, width: int = 0) -> Array:
     return out
 
 
+def _lanes(points: MassPoints) -> Indices:
+    """Return the mass point in each lane of each element (elements, lanes), -1 for none: Gauss points, then lumps."""
+    elements = points.weights.shape[1] // GAUSS
+    of_each = [np.flatnonzero(points.element == element) for element in range(elements)]
+    lanes = np.full((elements, padded(max(map(len, of_each)))), -1)
+    for row, own in zip(lanes, of_each, strict=True):
+        row[: own.size] = own
+    return lanes
+
+
+def _in_lanes(rows: Array, points: MassPoints) -> Array:
+    """Return rows (points, any) in the order of `_lanes`, zero where there is no point."""
+    return np.concatenate([rows, np.zeros_like(rows[:1])])[_lanes(points).ravel()]
+
+
+def _weights_in_lanes(points: MassPoints) -> tuple[Array, Array]:
+    """Return the parts (pitch, LANES) of `spans` and of `weights`."""
+    weights, step = _in_lanes(points.weights, points), _lanes(points).shape[1]
+    spans, own = np.zeros((2, len(weights) // LANES, LANES, LANES), dtype=weights.dtype)
+    for k, lane in enumerate(range(0, len(weights), LANES)):
+        first = lane // step * GAUSS
+        own[k, :, :GAUSS] = weights[lane : lane + LANES, first : first + GAUSS]
+        spans[k, :GAUSS], spans[k, BASE] = own[k, :, :GAUSS].T, 1.0
+        # All points of a later element have the weights at the end of this one.
+        after = weights[(lane // step + 1) * step :, first : first + GAUSS][:1]
+        spans[k, FULL, :GAUSS] = after[0] if after.size else 0.0
+    return spans, own
+
+
 def _kinds(body: BodyCoordinates) -> tuple[Indices, Indices]:
     """Return the flexible coordinates that move mass points of a beam along it, and those that move them across it."""
     if body.points is None:
@@ -263,11 +296,11 @@ def _body_records(bodies, ports, motor_sides, columns, kinds) -> Records:
     parts_of = zip(bodies, ports, motor_sides, columns, kinds, strict=True)
     for body, body_ports, body_motors, matrix, (along, across) in parts_of:
         s, nf, size, full = body.integrals, body.nf, 3 + body.nf, _is_full(body)
-        # Mass points, and the Gauss points whose slopes shorten them.
-        points, slopes = (0, 0) if body.points is None else body.points.weights.shape
+        slopes = 0 if body.points is None else body.points.weights.shape[1]
+        elements, step = (0, 0) if body.points is None else _lanes(body.points).shape
         parts = sum(port["parts"] for port in body_ports)
         # The lanes of the body's Jacobian rows have three more for its rigid coordinates.
-        stride, pitch, lanes = padded(nf), padded(points), padded(parts + 3)
+        stride, pitch, lanes = padded(nf), elements * step, padded(parts + 3)
         # Length of the body's part of each array, by the field that holds its start.
         own = {
             "flex": nf,
@@ -277,8 +310,7 @@ def _body_records(bodies, ports, motor_sides, columns, kinds) -> Records:
             "block": parts * lanes,
             "jac": size * lanes,
             "places": 3 * nf * pitch,
-            "spans": slopes * pitch,
-            "weights": points * pitch,
+            "spans": pitch * LANES,
             "along": along.size + across.size,
             "inertias": 3 * pitch,
             "dense": size * padded(size) if full else 0,
@@ -296,9 +328,9 @@ def _body_records(bodies, ports, motor_sides, columns, kinds) -> Records:
             "damping": starts["damping"] if own["damping"] else -1,
             "parts": parts,
             "lanes": lanes,
-            "points": points,
             "slopes": slopes,
             "pitch": pitch,
+            "step": step,
             "across": starts["along"] + along.size,
             "across_end": start["along"],
             "full": int(full),

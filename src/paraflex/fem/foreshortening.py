@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from paraflex.arrays import Array
+from paraflex.arrays import Array, Indices
 from .integrals import GAUSS_FRACTIONS, GAUSS_PLACES, GAUSS_POINTS, GAUSS_WEIGHTS, Lump, SpanProperties
 from .mesh import BeamMesh
 
@@ -31,6 +31,8 @@ class MassPoints:
         Slope rows N2'.
     weights : (k, g) array
         Quadrature weights: f at the points is weights @ (slope[:g] @ u)^2.
+    element : (k,) array of int
+        Element of each point: f at it consists of all elements before this one, and a part of this one.
     mixed : bool
         Whether coordinates may move points along the beam and across it; modes do either.
     """
@@ -41,6 +43,7 @@ class MassPoints:
     N: Array
     slope: Array
     weights: Array
+    element: Indices
     mixed: bool = False
 
     def in_basis(self, basis: Array) -> "MassPoints":
@@ -83,6 +86,7 @@ def mass_points(mesh: BeamMesh, spans: Sequence[SpanProperties], lumps: Sequence
         N=np.concatenate([N.reshape(n * g, 2, -1), *(shape[None] for shape, _ in shapes)]) @ basis,
         slope=np.concatenate([slopes, *(slope[None] for _, slope in shapes)]) @ basis,
         weights=weights,
+        element=np.append(np.repeat(np.arange(n), g), np.minimum(at, n - 1)).astype(int),
     )
 
 

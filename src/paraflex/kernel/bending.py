@@ -8,7 +8,7 @@ p'' as for any point. The mass matrix is the sum of m J^T J, which is positive d
 from math import cos, sin, sqrt
 
 from .compiling import inlined, kernel, routine
-from .packed import ANGLE, AXIS, DAMPING, MPF, OMEGA2, S2X, S2Y
+from .packed import ANGLE, AXIS, BASE, DAMPING, FULL, MPF, OMEGA2, S2X, S2Y
 from .sums import part_product
 from .vectors import LANES, add_product, add_scaled, load, padded, store, summed, zeros
 
@@ -31,6 +31,20 @@ def place_sums(system, i, q, v, a, points):
         store(points.shortening, pitch + block, add_product(zeros(), minus, s1))
         squares = add_product(zeros(), add_scaled(zeros(), s1, -1.0), s1)
         store(points.shortening, slope, add_product(squares, minus, load(points.a, slope)))
+    for start in range(0, 3 * pitch, pitch):
+        note_bases(system, body, start, points)
+
+
+@inlined
+def note_bases(system, body, start, points):
+    """Write the sum over the elements before each element beside its terms in points.shortening, from `start` on."""
+    base = 0.0
+    for element in range(0, body.pitch, body.step):
+        at = start + element
+        own = load(system.spans, body.spans + LANES * element + LANES * FULL)
+        own = add_product(zeros(), own, load(points.shortening, at))
+        points.shortening[at + BASE] = base
+        base += summed(own)
 
 
 @inlined
@@ -82,13 +96,18 @@ def second_order_equations(system, i, c, s, q, v, a, f, points):
         store(points.shares, slope, turn)
         fx, fy, turning = add_scaled(fx, mx, 1.0), add_scaled(fy, my, 1.0), add_scaled(turning, turn, 1.0)
         lever_x, lever_y = add_product(lever_x, sx, my), add_product(lever_y, sy, mx)
-    for block in range(0, pitch, LANES):
-        axial, at, slope = zeros(), body.weights + block, 2 * pitch + block
-        for k in range(body.points):
-            axial = add_scaled(axial, load(system.weights, at), points.shares[k])
-            at += pitch
-        store(points.axial, block, axial)
-        minus = add_scaled(zeros(), axial, -1.0)
+    later = 0.0
+    for element in range(pitch - body.step, -1, -body.step):
+        axial, after = zeros(), later
+        for block in range(element, element + body.step, LANES):
+            for k in range(LANES):
+                weights = load(system.weights, body.spans + LANES * (block + k))
+                axial = add_scaled(axial, weights, points.shares[block + k])
+            later += summed(load(points.shares, block))
+            store(points.axial, block, zeros())
+        axial = add_scaled(axial, load(system.spans, body.spans + LANES * (element + FULL)), after)
+        store(points.axial, element, axial)
+        minus, slope = add_scaled(zeros(), axial, -1.0), 2 * pitch + element
         store(points.shares, slope, add_product(load(points.shares, slope), minus, load(points.q, slope)))
     for j in range(n):
         f[e + j] = system.modal[OMEGA2, body.flex + j] * q[e + j] + system.modal[DAMPING, body.flex + j] * v[e + j]
@@ -114,13 +133,12 @@ def shortened(system, i, block, points):
     body = system.bodies[i]
     pitch = body.pitch
     sx = add_scaled(load(system.inertias, body.inertias + block), load(points.q, block), 1.0)
-    vx, bx, at = load(points.v, block), load(points.a, block), body.spans + block
-    for j in range(body.slopes):
-        weight = load(system.spans, at)
-        sx = add_scaled(sx, weight, points.shortening[j])
-        vx = add_scaled(vx, weight, points.shortening[pitch + j])
-        bx = add_scaled(bx, weight, points.shortening[2 * pitch + j])
-        at += pitch
+    vx, bx, first = load(points.v, block), load(points.a, block), block - block % body.step
+    for j in range(BASE + 1):
+        weight = load(system.spans, body.spans + LANES * (block + j))
+        sx = add_scaled(sx, weight, points.shortening[first + j])
+        vx = add_scaled(vx, weight, points.shortening[pitch + first + j])
+        bx = add_scaled(bx, weight, points.shortening[2 * pitch + first + j])
     return sx, vx, bx
 
 
@@ -128,15 +146,15 @@ def shortened(system, i, block, points):
 def second_order_shortening(system, i, q, points):
     """Return the sum of m f/2 over the mass points of body i: the shift of its first moment by bending."""
     body = system.bodies[i]
-    pitch, total = body.pitch, 0.0
+    total = zeros()
     place_sums(system, i, q, q, q, points)
-    for j in range(body.slopes):
-        weight = zeros()
-        for block in range(0, pitch, LANES):
-            mass = load(system.inertias, body.inertias + pitch + block)
-            weight = add_product(weight, load(system.spans, body.spans + j * pitch + block), mass)
-        total += 0.5 * summed(weight) * points.q[2 * pitch + j] * points.q[2 * pitch + j]
-    return total
+    for block in range(0, body.pitch, LANES):
+        shift, first = zeros(), block - block % body.step
+        for j in range(BASE + 1):
+            weight = load(system.spans, body.spans + LANES * (block + j))
+            shift = add_scaled(shift, weight, points.shortening[first + j])
+        total = add_product(total, shift, load(system.inertias, body.inertias + body.pitch + block))
+    return -summed(total)
 
 
 @inlined
@@ -212,10 +230,14 @@ def second_order_mass_row(system, i, l, mass, points):
     row, place = body.dense + (3 + l) * padded(3 + body.nf), body.places + 3 * pitch * l
     mx, my, lever = zeros(), zeros(), zeros()
     for block in range(0, pitch, LANES):
+        minus = add_scaled(zeros(), load(points.q, 2 * pitch + block), -1.0)
+        store(points.shortening, block, add_product(zeros(), minus, load(system.places, place + 2 * pitch + block)))
+    note_bases(system, body, 0, points)
+    for block in range(0, pitch, LANES):
         x, y = load(system.places, place + block), load(system.places, place + pitch + block)
-        for j in range(body.slopes):
-            scale = -points.q[2 * pitch + j] * system.places[place + 2 * pitch + j]
-            x = add_scaled(x, load(system.spans, body.spans + j * pitch + block), scale)
+        first = block - block % body.step
+        for j in range(BASE + 1):
+            x = add_scaled(x, load(system.spans, body.spans + LANES * (block + j)), points.shortening[first + j])
         m, inertia = masses(system, i, block)
         store(points.rows, 2 * pitch * l + block, x)
         m_x, m_y = add_product(zeros(), m, x), add_product(zeros(), m, y)

@@ -25,6 +25,9 @@ POINT, ANGLE, AXIS = range(3)
 CONSTRAINT, SPRING, DAMPER, FRICTION = range(4)
 # Weights of Phi'', Phi' and Phi for constraints on accelerations, without Baumgarte's terms.
 INDEX_1 = (1.0, 0.0, 0.0)
+# Number of Gauss points of an element. Beside their terms in a vector stands, in BASE, the sum over the elements
+# before; FULL is a row of PackedSystem.spans.
+GAUSS, BASE, FULL = 6, 6, 7
 # Rows of Workspace.flex: M_phif and 1/(1 + b omega^2).
 MPF, DINV = range(2)
 
@@ -51,12 +54,11 @@ BODY = _record(
     ("parts", np.int64),  # rows of its ports' Jacobians
     ("lanes", np.int64),  # columns of `Workspace.jac` and `Workspace.response`: these rows and three more, padded
     ("jac", np.int64),  # first entry of its (3 + nf) x lanes matrices there
-    ("points", np.int64),  # number of its mass points in second-order geometry, 0 in linear geometry
-    ("slopes", np.int64),  # number of Gauss points, which come first among the mass points
-    ("pitch", np.int64),  # number of its mass points, padded
+    ("slopes", np.int64),  # number of its Gauss points in second-order geometry, 0 in linear geometry
+    ("pitch", np.int64),  # lanes of its mass points, by element
+    ("step", np.int64),  # lanes of an element: its GAUSS Gauss points, then its lumps, padded
     ("places", np.int64),  # first entry of its nf x 3 pitch matrix in `places`
-    ("spans", np.int64),  # first entry of its slopes x pitch matrix in `spans`
-    ("weights", np.int64),  # first entry of its points x pitch matrix in `weights`
+    ("spans", np.int64),  # first entry of its pitch x LANES matrices in `spans` and `weights`
     # First entries of its coordinates in `kinds`: of those that move mass points along it, and across it.
     ("along", np.int64),
     ("across", np.int64),
@@ -173,9 +175,10 @@ class PackedSystem(NamedTuple):
     # Data of second-order geometry. `bending` is None without second-order geometry and dense iteration matrices;
     # kernels are then compiled without the code for these.
     bending: Array | None  # nf x stride matrix of every marker that bending displaces: f = u . bending u
-    # Data of every body's mass points: Nx, Ny and N2' of all points by coordinate; weights of all points by Gauss
-    # point, and of all Gauss points by point; x, mass and moment of inertia; numbers of the coordinates with Nx, and of
-    # those with Ny and N2'.
+    # Data of every body's mass points: Nx, Ny and N2' of all points by coordinate; x, mass and moment of inertia;
+    # numbers of the coordinates with Nx, and of those with Ny and N2'. By vector of points of one element: in `spans`
+    # the weights of these points by Gauss point, in the row BASE the weights of the sum over the elements before, and
+    # in the row FULL those of the Gauss points at the element's end; in `weights` those of the Gauss points by point.
     places: Array
     spans: Array
     weights: Array
@@ -204,7 +207,7 @@ class PointScratch(NamedTuple):
     a: Annotated[Floats, "sums"]
     shares: Annotated[Floats, "sums"]  # force on each
     axial: Annotated[Floats, "pitch"]  # axial forces at the Gauss points
-    shortening: Annotated[Floats, "sums"]  # -w^2/2 for the slopes w at the Gauss points, and its two derivatives
+    shortening: Annotated[Floats, "sums"]  # -w^2/2 for the slopes w, two derivatives; see `bending.note_bases`
     rows: Annotated[Floats, "tangents"]  # ds/du: x and y of all points by coordinate
     B_q: Annotated[Floats, "stride"]  # a marker's bending matrix times u
     B_v: Annotated[Floats, "stride"]

@@ -31,12 +31,12 @@ class Tangent(NamedTuple):
     f: Annotated[Floats, "n"]  # change of the residual of the equations of motion
     rows: Annotated[Floats, "m"]  # change of the residual of the rows
     friction: Annotated[Floats, "m"]  # slope of the rows of friction against the rate, at the last `note_slopes`
-    points: Array | None  # (8, max mass points of a body) scratch of second-order geometry
+    points: Array | None  # (8, most lanes of mass points of a body) scratch of second-order geometry
 
 
 def make_tangent(system: PackedSystem) -> Tangent:
     """Allocate a direction, set to zero, and the changes along it."""
-    points = None if system.bending is None else apart((8, int(system.bodies["points"].max(initial=0))))
+    points = None if system.bending is None else apart((8, int(system.bodies["pitch"].max(initial=0))))
     return allocated(Tangent, sizes_of(system), points=points)
 
 

@@ -1,8 +1,9 @@
 """Changes of the terms of one body along a direction, for both geometries: see `kernel.tangent`."""
 
 from .compiling import inlined, routine
-from .packed import DAMPING, GJ, I1, OMEGA2, S2X, S2Y
+from .packed import DAMPING, FULL, GAUSS, GJ, I1, OMEGA2, S2X, S2Y
 from .tangent_points import rotated_tangent, turned_axes
+from .vectors import LANES
 
 # Rows of Tangent.points: slopes at the Gauss points, their two derivatives, the axial force there; and changes of
 # these.
@@ -105,12 +106,20 @@ def body_tangent(system, i, q, v, a, direction):
     direction.f[o + 2] += 2.0 * (d_w * (i1v + uI2v) + w * (d_i1v + d_uI2v))
 
 
+@inlined
+def span_weight(system, body, k, j):
+    """Return the weight of the Gauss point in lane j in the shortening of the mass point in lane k."""
+    if k // body.step == j // body.step:
+        return system.spans[body.spans + LANES * (k - k % LANES + j % body.step) + k % LANES]
+    return system.spans[body.spans + LANES * (j - j % body.step + FULL) + j % body.step]
+
+
 @routine
 def second_order_slopes(system, i, q, v, a, direction, points):
     """Compute slopes at the Gauss points of body i, their derivatives, and the changes of these, into points."""
     body = system.bodies[i]
     e = body.offset + 3
-    for j in range(body.slopes):
+    for j in range(body.pitch):
         for row in range(8):
             points[row, j] = 0.0
         for l in range(body.nf):
@@ -141,15 +150,17 @@ def second_order_tangent(system, i, q, v, a, direction, points):
             + system.modal[DAMPING, body.flex + l] * direction.v[e + l]
         )
     fx, fy, d_fx, d_fy, d_torque = 0.0, 0.0, 0.0, 0.0, 0.0
-    for k in range(body.points):
+    for k in range(pitch):
         x, y, turns, at = body.places + k, body.places + pitch + k, body.places + 2 * pitch + k, body.inertias + k
         mass, inertia = system.inertias[at + pitch], system.inertias[at + 2 * pitch]
         (ux, sy), (d_sx, d_sy) = plane_sums(system.places, x, y, stride, n, e, q, direction.q)
         (vx, vy), (d_vx, d_vy) = plane_sums(system.places, x, y, stride, n, e, v, direction.v)
         (bx, by), (d_bx, d_by) = plane_sums(system.places, x, y, stride, n, e, a, direction.a)
         sx = system.inertias[at] + ux
-        for j in range(body.slopes):
-            weight = system.spans[body.spans + j * pitch + k]
+        for j in range(k - k % body.step + GAUSS):
+            if j % body.step >= GAUSS:
+                continue
+            weight = span_weight(system, body, k, j)
             s0, s1, s2 = points[W0, j], points[W1, j], points[W2, j]
             d0, d1, d2 = points[DW0, j], points[DW1, j], points[DW2, j]
             sx -= 0.5 * weight * s0 * s0
@@ -173,8 +184,10 @@ def second_order_tangent(system, i, q, v, a, direction, points):
                 direction.f[e + l] += system.places[turns + l * stride] * turn
         for l in range(n):
             direction.f[e + l] += system.places[x + l * stride] * d_mx + system.places[y + l * stride] * d_my
-        for j in range(body.slopes):
-            weight = system.spans[body.spans + j * pitch + k]
+        for j in range(k - k % body.step + GAUSS):
+            if j % body.step >= GAUSS:
+                continue
+            weight = span_weight(system, body, k, j)
             points[AXIAL_FORCE, j] += weight * mx
             points[DAXIAL_FORCE, j] += weight * d_mx
         fx += mx
@@ -182,7 +195,7 @@ def second_order_tangent(system, i, q, v, a, direction, points):
         d_fx += d_mx
         d_fy += d_my
         d_torque += d_sx * my + sx * d_my - d_sy * mx - sy * d_mx + turn
-    for j in range(body.slopes):
+    for j in range(pitch):
         force = points[DW0, j] * points[AXIAL_FORCE, j] + points[W0, j] * points[DAXIAL_FORCE, j]
         for l in range(n):
             direction.f[e + l] -= system.places[body.places + (3 * l + 2) * pitch + j] * force
