@@ -10,7 +10,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from paraflex.kernel.packed import ANGLE, PackedSystem
+from paraflex.kernel.packed import ANGLE, GAUSS, PackedSystem
+from paraflex.kernel.vectors import LANES
 
 
 def equations(p: PackedSystem) -> int:
@@ -35,12 +36,13 @@ def _bent_terms(p: PackedSystem, body: np.void) -> int:
     """The same by mass points: slopes at Gauss points, a point's s, s', s'' and its force, which goes back to all."""
     n, total = int(body["nf"]), 40
     total += int(body["slopes"]) * (6 * n + 2 * n + 1) + 4 * n
-    count, pitch, slopes = int(body["points"]), int(body["pitch"]), int(body["slopes"])
-    weights = p.spans[body["spans"] :][: slopes * pitch].reshape(slopes, pitch)
-    for k in range(count):
-        # A point is shortened by the Gauss points up to it.
-        total += 12 * n + 11 * (1 + int(np.max(np.nonzero(weights[:, k])[0], initial=-1))) + 32 + 4 * n
-        if p.inertias[body["inertias"] + 2 * pitch + k] > 0.0:
+    pitch = int(body["pitch"])
+    mass, inertia = p.inertias[body["inertias"] :][pitch : 3 * pitch].reshape(2, pitch)
+    weights = p.spans[body["spans"] :][: LANES * pitch].reshape(-1, LANES, LANES)
+    for k in np.flatnonzero(mass + inertia).tolist():
+        # A point is shortened by the Gauss points of its element, and by the sum over those of the elements before.
+        total += 12 * n + 11 * (1 + int(np.count_nonzero(weights[k // LANES, :GAUSS, k % LANES]))) + 32 + 4 * n
+        if inertia[k] > 0.0:
             total += 4 * n + 1
     return total
 

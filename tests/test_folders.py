@@ -115,6 +115,17 @@ def test_broken_off_it_leaves_what_was_there(folder, error):
     assert not (folder / ".new").exists()
 
 
+def test_figures_that_a_killed_command_was_drawing_vanish(folder):
+    write(folder / ".drawn" / "figures", {"path.png": "half"})
+    assert foreign_files(folder) == ["figures/mine.png", "notes.txt"]
+    with hold_folder(folder, RUN) as held:
+        assert not (folder / ".drawn").exists()
+        with held.drawn_files() as drawn:
+            write(drawn, {"path.png": "whole"})
+    assert not drawn.exists()
+    assert ours(folder) == BEFORE
+
+
 def test_ctrl_c_waits_until_all_files_are_in_their_place(folder, monkeypatch):
     import paraflex.folders.changes as module
 
@@ -339,7 +350,7 @@ def test_nothing_is_moved_or_removed_where_links_lead_out(tmp_path, hostile):
 
 
 @pytest.mark.skipif(os.name == "nt", reason="links need a privilege")
-@pytest.mark.parametrize("name", [".ready", ".lock", "figures", ".new"])
+@pytest.mark.parametrize("name", [".ready", ".lock", "figures", ".new", ".drawn"])
 def test_links_in_place_of_own_files_and_folders_are_refused(folder, tmp_path, name):
     outside = foreign(tmp_path / "outside", ["a"])
     shutil.move(outside / ".ready", tmp_path / "theirs")

@@ -65,7 +65,7 @@ def test_no_import_goes_in_a_circle():
     assert circle(imports | {"paraflex.errors": {"paraflex.tracking"}})
 
 
-@pytest.mark.parametrize(("family", "others"), [("sweeps", "optimisation"), ("optimisation", "sensitivities")])
+@pytest.mark.parametrize(("family", "others"), [("sweeps", "optimisation"), ("optimisation", "sensitivity")])
 def test_families_of_studies_do_not_know_one_another(family, others):
     graph = grimp.build_graph("paraflex", cache_dir=None)
     names = [f"paraflex.studies.{name}" for name in (family, others)]

@@ -4,6 +4,8 @@ import os
 import subprocess
 import sys
 
+import pytest
+
 from paraflex.campaign.workers import share_out
 
 
@@ -39,6 +41,38 @@ except ValueError as error:
         # The call whose copy died is made by the process itself.
         assert writers[3] == first
         assert writers[8] != first
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="processes are not copied")
+def test_calls_are_made_while_the_process_goes_on(tmp_path):
+    """The block waits for a call to be made; an error in it ends the copies."""
+    program = f"""
+import time
+from functools import partial
+from pathlib import Path
+from paraflex.campaign.workers import sharing_out
+
+folder = Path({str(tmp_path)!r})
+
+def write(name, seconds):
+    time.sleep(seconds)
+    (folder / name).touch()
+
+with sharing_out([partial(write, "one", 0.0), partial(write, "two", 0.0)]) as finish:
+    while not (folder / "one").exists():
+        time.sleep(0.01)
+    finish()
+    print((folder / "two").exists())
+began = time.monotonic()
+try:
+    with sharing_out([partial(write, "three", 60.0)] * 2):
+        raise KeyboardInterrupt
+except KeyboardInterrupt:
+    print(time.monotonic() - began < 30.0)
+"""
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True)
+    assert done.stdout.split() == ["True", "True"]
+    assert not (tmp_path / "three").exists()
 
 
 def test_a_process_with_several_threads_is_not_copied(monkeypatch):

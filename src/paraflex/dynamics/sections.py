@@ -71,7 +71,8 @@ class SectionLoads(NamedTuple):
 
         It is due to bending alone where the axial force is NaN; NaN where the outermost fibre is not known.
         """
-        return np.abs(np.nan_to_num(self.force)) / np.real(self.area) + np.abs(self.moment) / np.real(self.modulus)
+        # fmax ignores NaN.
+        return np.fmax(np.abs(self.force), 0.0) / np.real(self.area) + np.abs(self.moment) / np.real(self.modulus)
 
 
 @dataclass(frozen=True)
@@ -116,7 +117,7 @@ class Sections:
     def largest_stress(self, system: System, q: Array, v: Array, a: Array, multipliers: Array) -> Array:
         """Return the largest stress in any section (k,) [Pa]; sections without a known outermost fibre do not count."""
         found = self._parts_loads(system, q, v, a, multipliers)
-        return np.max([np.max(np.nan_to_num(loads.stress), axis=1) for _, loads in found], axis=0)
+        return np.max([np.fmax.reduce(loads.stress, axis=1, initial=0.0) for _, loads in found], axis=0)
 
     def stress_errors(self, system: System, errors: Array) -> Iterator[tuple[str, float]]:
         """Yield beams with bounds of the errors of their stresses [Pa], from those of the coordinates (n,).

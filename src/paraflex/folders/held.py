@@ -260,7 +260,10 @@ class ResultsFolder:
         """Yield a temporary folder for files drawn while results are written, from which they are moved afterwards."""
         drawn = self.path / DRAWN
         try:
-            drawn.mkdir(parents=True, exist_ok=True)
+            drawn.mkdir()
+        except OSError as error:
+            raise unwritable(error, str(self.path), self.remedy) from error
+        try:
             yield drawn
         finally:
             with uninterrupted():
@@ -343,10 +346,10 @@ def hold_folder(
                 )  # fmt: skip
             try:
                 with uninterrupted():  # otherwise an empty folder could remain
-                    for left in (NEW, DRAWN):
-                        shutil.rmtree(path / left, ignore_errors=True)
-                    (path / NEW).mkdir()
-                    (path / NEW).rmdir()
+                    for name in (NEW, DRAWN):
+                        shutil.rmtree(path / name, ignore_errors=True)
+                        (path / name).mkdir()
+                        (path / name).rmdir()
             except OSError as error:
                 raise unwritable(error, field, ELSEWHERE, str(path)) from error
             yield ResultsFolder(path, kind, locks=locks, remedy=remedy)
