@@ -58,7 +58,8 @@ def sparse_mass(system: System, q: Array) -> scipy.sparse.csr_matrix:
     """Return the mass matrix (n, n) at q, one block per body."""
     columns, starts = system.once("entries of the mass matrix", lambda: _blocks(system))
     values = np.concatenate([np.zeros(0), *(block.ravel() for block in body_masses(system, q))])
-    return scipy.sparse.csr_matrix((values, columns.copy(), starts.copy()), shape=(system.n, system.n))
+    # The matrix has copies of these, in fewer bits.
+    return scipy.sparse.csr_matrix((values, columns, starts), shape=(system.n, system.n))
 
 
 def _blocks(system: System) -> tuple[Indices, Indices]:
@@ -66,7 +67,7 @@ def _blocks(system: System) -> tuple[Indices, Indices]:
     columns = [np.tile(np.arange(body.all.start, body.all.stop), 3 + body.nf) for body in system.bodies]
     sizes = np.array([3 + body.nf for body in system.bodies], dtype=int)
     starts = np.concatenate([[0], np.cumsum(np.repeat(sizes, sizes))])
-    return np.concatenate([np.zeros(0, dtype=int), *columns]).astype(np.int32), starts.astype(np.int32)
+    return np.concatenate([np.zeros(0, dtype=int), *columns]), starts
 
 
 def stiffness_diagonal(system: System) -> Array:
