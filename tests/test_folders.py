@@ -359,8 +359,9 @@ def test_links_in_place_of_own_files_and_folders_are_refused(folder, tmp_path, n
         shutil.rmtree(folder / name)
     (folder / name).unlink(missing_ok=True)
     (folder / name).symlink_to(tmp_path / ("new file" if name == ".lock" else "theirs"))
-    with pytest.raises(OutputError):
+    with pytest.raises(OutputError) as raised:
         replace(folder, AFTER)
+    assert name in str(raised.value)
     after = {file: file.read_bytes() for file in tmp_path.rglob("*") if file.is_file() and folder not in file.parents}
     assert after == before
 

@@ -130,6 +130,17 @@ def work(request):
     except KeyboardInterrupt:
         raise ImportError("a library was left half imported")
 """
+# One that was interrupted when its numbers were written.
+WRITTEN = """
+import sys
+def work(request):
+    try:
+        print("drawing", flush=True)
+        __import__("time").sleep(600)
+    except KeyboardInterrupt as interrupt:
+        interrupt.args = ("the numbers are in out",)
+        raise
+"""
 # What all of them end with.
 CALLED = """
 answer(work)
@@ -228,6 +239,14 @@ def test_libraries_do_not_keep_a_command_from_ending(script, when, last):
     assert (done.returncode, done.stderr) == (143, "interrupted; the same command starts over\n")
     # An import is brought to its end: half of one can be neither used nor begun again.
     assert done.stdout.split()[-1] == last
+
+
+def test_a_command_says_where_its_numbers_are():
+    with started(sys.executable, "-c", ANSWER + WRITTEN + CALLED) as child:
+        child.until(lambda: "drawing" in child.out)
+        child.send(signal.SIGINT)
+        done = child.end()
+    assert (done.returncode, done.stderr) == (130, "interrupted: the numbers are in out\n")
 
 
 @pytest.mark.parametrize("after", [0.05, 0.2, 0.5, 1.0, 2.0])

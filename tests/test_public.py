@@ -21,6 +21,11 @@ def test_import_is_light():
     python("-c", code, check=True)
 
 
+def test_all_names_are_there_in_a_new_process():
+    """Submodules among them as well, which other tests have imported here."""
+    python("-c", "from paraflex import *; from paraflex.studies import *; from paraflex.control import *", check=True)
+
+
 @pytest.mark.parametrize("name", paraflex.__all__)
 def test_public_names_exist(name):
     assert getattr(paraflex, name) is not None

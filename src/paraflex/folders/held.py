@@ -350,6 +350,11 @@ def hold_folder(
                         shutil.rmtree(path / name, ignore_errors=True)
                         (path / name).mkdir()
                         (path / name).rmdir()
+            except FileExistsError as error:
+                raise OutputError(
+                    "cannot be written (a file or a link of that name is there)", field=str(error.filename),
+                    remedy="move it elsewhere",
+                ) from error  # fmt: skip
             except OSError as error:
                 raise unwritable(error, field, ELSEWHERE, str(path)) from error
             yield ResultsFolder(path, kind, locks=locks, remedy=remedy)

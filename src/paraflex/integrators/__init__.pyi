@@ -1,3 +1,4 @@
+from . import methods as methods
 from .events import (
     DeflectionLimit as DeflectionLimit,
     Event as Event,

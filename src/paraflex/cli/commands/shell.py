@@ -35,8 +35,13 @@ class ListedCommand(NamedTuple):
             # An interrupted library may raise an error of its own instead.
             if not isinstance(error, KeyboardInterrupt) and not is_taken():
                 raise
-            kept = "what is done is kept, and the same command continues from there"
-            typer.echo(f"interrupted; {kept if self.request in _STUDIES else 'the same command starts over'}", err=True)
+            if self.request in _STUDIES:
+                end = "; what is done is kept, and the same command continues from there"
+            elif isinstance(error, KeyboardInterrupt) and error.args:
+                end = f": {error.args[0]}"
+            else:
+                end = "; the same command starts over"
+            typer.echo(f"interrupted{end}", err=True)
             return exit_code()
 
 
