@@ -110,7 +110,7 @@ def public_names(package: str) -> list[str]:
         if isinstance(node, ast.Assign) and getattr(node.targets[0], "id", "") == "__all__":
             with suppress(ValueError):  # of packages that read it from their stubs
                 return ast.literal_eval(node.value)
-        if isinstance(node, ast.ImportFrom):
+        if isinstance(node, ast.ImportFrom) and node.module:
             names += [alias.name for alias in node.names if alias.asname == alias.name]
         if isinstance(node, ast.FunctionDef | ast.ClassDef) and not node.name.startswith("_"):
             names.append(node.name)
@@ -138,7 +138,10 @@ def _module(package: str, node: ast.ImportFrom) -> str:
 def _origin(package: str, name: str) -> str:
     """The module a package takes a name from, followed as far as packages hand it on; and the name."""
     for node in _tree(package).body:
-        if isinstance(node, ast.ImportFrom) and any((alias.asname or alias.name) == name for alias in node.names):
+        # `from . import NAME` names a module of the package itself.
+        if not isinstance(node, ast.ImportFrom) or node.module is None:
+            continue
+        if any((alias.asname or alias.name) == name for alias in node.names):
             module = _module(package, node)
             return _origin(module, name) if (SOURCE / module.replace(".", "/")).is_dir() else f"{module}.{name}"
     if package == "plots":
