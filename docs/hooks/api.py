@@ -110,7 +110,7 @@ def public_names(package: str) -> list[str]:
         if isinstance(node, ast.Assign) and getattr(node.targets[0], "id", "") == "__all__":
             with suppress(ValueError):  # of packages that read it from their stubs
                 return ast.literal_eval(node.value)
-        if isinstance(node, ast.ImportFrom) and node.module:
+        if isinstance(node, ast.ImportFrom) and (node.module or not package):
             names += [alias.name for alias in node.names if alias.asname == alias.name]
         if isinstance(node, ast.FunctionDef | ast.ClassDef) and not node.name.startswith("_"):
             names.append(node.name)
