@@ -2,7 +2,7 @@
 
 import time
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import contextmanager, nullcontext
+from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import partial
 from typing import Any
@@ -133,15 +133,17 @@ def _run(request: RunRequest, model: Model, planned: Sequence[_Along], fidelity:
         for along in planned:
             with apart():
                 result, plain = _simulated(console, model, along)
-                with _drawing(console, request, along, result):
-                    if result.data is not None:
-                        write_numbers(result.data, plain, along.folder)
+                if result.data is None:
                     done[along.path], numbers[along.path] = result, plain
-                    if result.data is not None and alone:
-                        print_results(plain, show, as_json=request.json)
-                    elif result.data is not None:
-                        warn_of(PlainConsole(stderr=request.json), verdict_of(result.data), along.whose)
-                if result.data is not None:
+                    failures(console, result, along.whose)
+                else:
+                    with _drawing(console, request, along, result):
+                        write_numbers(result.data, plain, along.folder)
+                        done[along.path], numbers[along.path] = result, plain
+                        if alone:
+                            print_results(plain, show, as_json=request.json)
+                        else:
+                            warn_of(PlainConsole(stderr=request.json), verdict_of(result.data), along.whose)
                     places.append(where(began, "results", along.folder.path, request.drawn))
             if result.interrupted:
                 break
@@ -172,9 +174,10 @@ def _simulated(console: PlainConsole, model: Model, along: _Along) -> tuple[Stud
 
 @contextmanager
 def _drawing(console: PlainConsole, request: RunRequest, along: _Along, result: StudyResult) -> Iterator[None]:
-    """Draw while the block writes the numbers, unless no mode could start, and print which modes failed."""
+    """Draw while the block writes the numbers, and print which modes failed."""
+    assert result.data is not None
     try:
-        with nullcontext() if result.data is None else drawing(result.data, along.folder, request.drawn):
+        with drawing(result.data, along.folder, request.drawn):
             yield
     finally:
         failures(console, result, along.whose)

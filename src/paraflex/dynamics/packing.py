@@ -57,10 +57,12 @@ def pack_system(placed: PlacedBodies, constraints: list[Constraint]) -> tuple[Pa
     tracks, breaks, coefficients = _tracks([bodies[i] for i in packer.tracks])
     kinds = [_kinds(body) for body in bodies]
     bent = [marker.bending for marker in markers if marker.bending is not None]
-    points = [body.points for body in bodies if body.points is not None]
+    lanes = [_lanes(body.points) for body in bodies]
+    points = [(p, each) for p, each in zip([body.points for body in bodies], lanes, strict=True) if p is not None]
+    weights = [_weights_in_lanes(*each) for each in points]
 
     packed = PackedSystem(
-        bodies=_body_records(bodies, packer.ports, packer.motor_sides, columns, kinds),
+        bodies=_body_records(bodies, packer.ports, packer.motor_sides, columns, kinds, lanes),
         markers=_marker_records(markers),
         ports=_port_records(packer.ports),
         motor_sides=records(MOTOR_SIDE, [side for group in packer.motor_sides for side in group]),
@@ -82,10 +84,12 @@ def pack_system(placed: PlacedBodies, constraints: list[Constraint]) -> tuple[Pa
         bending=_flat([_padded(each) for each in bent]) if any(_is_full(body) for body in bodies) else None,
         # All mass points of a body: Nx, Ny and N2' by coordinate (nf, 3 pitch); position along the beam, mass and
         # moment of inertia (3, pitch).
-        places=_flat([np.hstack([_in_lanes(rows, p).T for rows in (p.N[:, 0], p.N[:, 1], p.slope)]) for p in points]),
-        spans=_flat([spans for spans, _ in map(_weights_in_lanes, points)]),
-        weights=_flat([weights for _, weights in map(_weights_in_lanes, points)]),
-        inertias=_flat([_in_lanes(np.stack([p.x, p.mass, p.inertia], axis=1), p).T for p in points]),
+        places=_flat(
+            [np.hstack([_in_lanes(rows, at).T for rows in (p.N[:, 0], p.N[:, 1], p.slope)]) for p, at in points]
+        ),
+        spans=_flat([spans for spans, _ in weights]),
+        weights=_flat([own for _, own in weights]),
+        inertias=_flat([_in_lanes(np.stack([p.x, p.mass, p.inertia], axis=1), at).T for p, at in points]),
         kinds=np.concatenate([numbers for each in kinds for numbers in each]),
         total_mass=np.sum([body.integrals.m for body in bodies]).item(),
         size=packer.size,
@@ -225,16 +229,18 @@ def _flat(matrices: list[Array]) -> Array:
     return np.concatenate([np.zeros(0), *(matrix.ravel() for matrix in matrices)])
 
 
-def _padded(matrix: Array, width: int = 0) -> Array:
-    """Return the matrix padded with columns of zeros to whole vectors, of a width at least."""
+def _padded(matrix: Array) -> Array:
+    """Return the matrix padded with columns of zeros to whole vectors."""
     rows, columns = matrix.shape
-    out = np.zeros((rows, padded(max(columns, width))), dtype=matrix.dtype)
+    out = np.zeros((rows, padded(columns)), dtype=matrix.dtype)
     out[:, :columns] = matrix
     return out
 
 
-def _lanes(points: MassPoints) -> Indices:
+def _lanes(points: MassPoints | None) -> Indices:
     """Return the mass point in each lane of each element (elements, lanes), -1 for none: Gauss points, then lumps."""
+    if points is None:
+        return np.zeros((0, 0), dtype=int)
     elements = points.weights.shape[1] // GAUSS
     of_each = [np.flatnonzero(points.element == element) for element in range(elements)]
     lanes = np.full((elements, padded(max(map(len, of_each)))), -1)
@@ -243,14 +249,14 @@ def _lanes(points: MassPoints) -> Indices:
     return lanes
 
 
-def _in_lanes(rows: Array, points: MassPoints) -> Array:
+def _in_lanes(rows: Array, lanes: Indices) -> Array:
     """Return rows (points, any) in the order of `_lanes`, zero where there is no point."""
-    return np.concatenate([rows, np.zeros_like(rows[:1])])[_lanes(points).ravel()]
+    return np.concatenate([rows, np.zeros_like(rows[:1])])[lanes.ravel()]
 
 
-def _weights_in_lanes(points: MassPoints) -> tuple[Array, Array]:
+def _weights_in_lanes(points: MassPoints, lanes: Indices) -> tuple[Array, Array]:
     """Return the parts (pitch, LANES) of `spans` and of `weights`."""
-    weights, step = _in_lanes(points.weights, points), _lanes(points).shape[1]
+    weights, step = _in_lanes(points.weights, lanes), lanes.shape[1]
     spans, own = np.zeros((2, len(weights) // LANES, LANES, LANES), dtype=weights.dtype)
     for k, lane in enumerate(range(0, len(weights), LANES)):
         first = lane // step * GAUSS
@@ -290,17 +296,15 @@ def records(dtype: np.dtype, values: list[dict[str, Any]]) -> Records:
     return np.array(rows, dtype=dtype)
 
 
-def _body_records(bodies, ports, motor_sides, columns, kinds) -> Records:
+def _body_records(bodies, ports, motor_sides, columns, kinds, point_lanes) -> Records:
     values: list[dict] = []
     start: Counter[str] = Counter()
-    parts_of = zip(bodies, ports, motor_sides, columns, kinds, strict=True)
-    for body, body_ports, body_motors, matrix, (along, across) in parts_of:
+    parts_of = zip(bodies, ports, motor_sides, columns, kinds, point_lanes, strict=True)
+    for body, body_ports, body_motors, matrix, (along, across), by_element in parts_of:
         s, nf, size, full = body.integrals, body.nf, 3 + body.nf, _is_full(body)
-        slopes = 0 if body.points is None else body.points.weights.shape[1]
-        elements, step = (0, 0) if body.points is None else _lanes(body.points).shape
         parts = sum(port["parts"] for port in body_ports)
         # The lanes of the body's Jacobian rows have three more for its rigid coordinates.
-        stride, pitch, lanes = padded(nf), elements * step, padded(parts + 3)
+        stride, pitch, lanes = padded(nf), by_element.size, padded(parts + 3)
         # Length of the body's part of each array, by the field that holds its start.
         own = {
             "flex": nf,
@@ -328,9 +332,9 @@ def _body_records(bodies, ports, motor_sides, columns, kinds) -> Records:
             "damping": starts["damping"] if own["damping"] else -1,
             "parts": parts,
             "lanes": lanes,
-            "slopes": slopes,
+            "slopes": GAUSS * len(by_element),
             "pitch": pitch,
-            "step": step,
+            "step": by_element.shape[1],
             "across": starts["along"] + along.size,
             "across_end": start["along"],
             "full": int(full),

@@ -352,7 +352,7 @@ def hold_folder(
                         (path / name).rmdir()
             except FileExistsError as error:
                 raise OutputError(
-                    "cannot be written (a file or a link of that name is there)", field=str(error.filename),
+                    "cannot be written (it is there, and cannot be removed)", field=str(error.filename),
                     remedy="move it elsewhere",
                 ) from error  # fmt: skip
             except OSError as error:

@@ -142,6 +142,15 @@ def shortened(system, i, block, points):
     return sx, vx, bx
 
 
+@inlined
+def add_shortening(system, body, block, points, total):
+    """Add to eight mass points the first of the sums of `shortened` alone."""
+    first = block - block % body.step
+    for j in range(BASE + 1):
+        total = add_scaled(total, load(system.spans, body.spans + LANES * (block + j)), points.shortening[first + j])
+    return total
+
+
 @routine
 def second_order_shortening(system, i, q, points):
     """Return the sum of m f/2 over the mass points of body i: the shift of its first moment by bending."""
@@ -149,10 +158,7 @@ def second_order_shortening(system, i, q, points):
     total = zeros()
     place_sums(system, i, q, q, q, points)
     for block in range(0, body.pitch, LANES):
-        shift, first = zeros(), block - block % body.step
-        for j in range(BASE + 1):
-            weight = load(system.spans, body.spans + LANES * (block + j))
-            shift = add_scaled(shift, weight, points.shortening[first + j])
+        shift = add_shortening(system, body, block, points, zeros())
         total = add_product(total, shift, load(system.inertias, body.inertias + body.pitch + block))
     return -summed(total)
 
@@ -235,9 +241,7 @@ def second_order_mass_row(system, i, l, mass, points):
     note_bases(system, body, 0, points)
     for block in range(0, pitch, LANES):
         x, y = load(system.places, place + block), load(system.places, place + pitch + block)
-        first = block - block % body.step
-        for j in range(BASE + 1):
-            x = add_scaled(x, load(system.spans, body.spans + LANES * (block + j)), points.shortening[first + j])
+        x = add_shortening(system, body, block, points, x)
         m, inertia = masses(system, i, block)
         store(points.rows, 2 * pitch * l + block, x)
         m_x, m_y = add_product(zeros(), m, x), add_product(zeros(), m, y)
