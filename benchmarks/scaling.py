@@ -27,8 +27,6 @@ from paraflex.dynamics import State, System, build_system, constant_signals, pac
 from paraflex.integrators import IntegrationOptions, make_problem
 from paraflex.integrators.native import NativeRun, prepare
 from paraflex.kernel.indices import ITERATIONS, REJECTED, STEPS
-from paraflex.kinematics import path_follower
-from paraflex.kinematics.paths import Line
 from paraflex.linear import linearise
 from paraflex.mechanism import (
     Assembly,
@@ -42,6 +40,8 @@ from paraflex.mechanism import (
     four_bars_in_a_row,
 )
 from paraflex.motion import simulate_motion
+from paraflex.paths import path_follower
+from paraflex.paths.paths import Line
 from paraflex.tracking import plan_tracking
 
 NUMBERS = (10, 20, 50, 100, 200, 500, 1000)

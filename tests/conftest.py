@@ -12,7 +12,6 @@ import pytest
 
 from paraflex.dynamics import build_system
 from paraflex.fem import ReferenceCondition
-from paraflex.kinematics import Polygon
 from paraflex.mechanism import (
     Assembly,
     Curvature,
@@ -32,6 +31,7 @@ from paraflex.mechanism import (
     Section,
     raparm_i,
 )
+from paraflex.paths import Polygon
 from paraflex.tracking import plan_tracking
 
 # In the background of a shell, or under nohup, processes ignore it, and so do all that they start.

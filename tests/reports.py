@@ -13,8 +13,8 @@ import numpy as np
 import xarray as xr
 
 from paraflex.integrators import IntegrationOptions
-from paraflex.kinematics import Polygon
 from paraflex.mechanism import raparm_i
+from paraflex.paths import Polygon
 from paraflex.report import Page, render
 from paraflex.report.packing import MISSING
 from paraflex.studies import run_study

@@ -18,7 +18,6 @@ from paraflex.actuation.quintic import quintic_splines
 from paraflex.dynamics import build_system, constant_signals, pack_signals, piecewise_quintic
 from paraflex.errors import ActuationError, InputError, SingularActuationError
 from paraflex.kernel.signals import evaluate_signal
-from paraflex.kinematics import Circle, Line, follow_path
 from paraflex.mechanism import (
     Assembly,
     EndEffector,
@@ -31,6 +30,7 @@ from paraflex.mechanism import (
     mode_of_signs,
     parse_mode,
 )
+from paraflex.paths import Circle, Line, follow_path
 from paraflex.tracking import plan_tracking
 
 # Table 1 of the paper (published): signs of tau1, tau2, tau5, tau6.

@@ -26,7 +26,6 @@ from paraflex.files import library_file, library_names, load
 from paraflex.integrators import IntegrationOptions
 from paraflex.kernel.packed import CONSTRAINT, INDEX_1
 from paraflex.kernel.stage import equations
-from paraflex.kinematics.paths import PathMotion
 from paraflex.mechanism import (
     Assembly,
     ConstantSpeed,
@@ -48,6 +47,7 @@ from paraflex.mechanism import (
     raparm_i,
 )
 from paraflex.motion import simulate_motion
+from paraflex.paths.paths import PathMotion
 from paraflex.tracking import plan_tracking
 from shell import paraflex
 

@@ -14,7 +14,6 @@ from paraflex.elastodynamics import simulate_ked
 from paraflex.errors import InputError, ModelWarning, ResultWarning, SliderOffBeamError, UnreachablePathError
 from paraflex.files import library_names, load
 from paraflex.integrators import METHODS, IntegrationOptions, JointLimit
-from paraflex.kinematics import Line
 from paraflex.mechanism import (
     Assembly,
     AtEnd,
@@ -34,6 +33,7 @@ from paraflex.mechanism import (
     finite_segments,
 )
 from paraflex.motion import simulate_motion
+from paraflex.paths import Line
 from paraflex.results import motion_dataset, motion_summary, summary, tracking_dataset
 from paraflex.tracking import plan_tracking, simulate
 from shell import paraflex

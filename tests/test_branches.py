@@ -16,7 +16,6 @@ from paraflex.errors import (
     SingularPositionError,
 )
 from paraflex.integrators import IntegrationOptions
-from paraflex.kinematics.closure import PathClosure
 from paraflex.mechanism import (
     Assembly,
     ConstantSpeed,
@@ -31,6 +30,7 @@ from paraflex.mechanism import (
     SampledAngle,
     Start,
 )
+from paraflex.paths.closure import PathClosure
 from shell import paraflex
 
 LENGTHS = (1.0, 0.5, 1.2, 0.8)

@@ -6,7 +6,7 @@ import sys
 import pytest
 
 from paraflex.files import load
-from paraflex.kinematics import length_fraction
+from paraflex.paths import length_fraction
 from paraflex.results import load_results
 from shell import interrupted, paraflex
 from test_cli import FAST

@@ -12,7 +12,6 @@ import paraflex as pf
 import twins
 from conftest import SQUARE
 from paraflex.errors import AssemblyError, InputError, UnreachablePathError
-from paraflex.kinematics import Circle, Line, Polygon, TrapezoidalProfile, follow_path, pose_at
 from paraflex.mechanism import (
     Assembly,
     EndEffector,
@@ -24,6 +23,7 @@ from paraflex.mechanism import (
     RigidBody,
     SampledAngle,
 )
+from paraflex.paths import Circle, Line, Polygon, TrapezoidalProfile, follow_path, pose_at
 
 # Both links of an arm of RAParM-I, stretched [m].
 REACH = twins.L1 + twins.L2

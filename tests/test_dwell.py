@@ -14,7 +14,6 @@ from paraflex.fem import ReferenceCondition
 from paraflex.files import load
 from paraflex.integrators import METHODS, IntegrationOptions, JointLimit
 from paraflex.integrators.method import NativeMethod
-from paraflex.kinematics import Line, PointPath, Polygon
 from paraflex.mechanism import (
     Assembly,
     EndEffector,
@@ -30,6 +29,7 @@ from paraflex.mechanism import (
     Section,
     raparm_i,
 )
+from paraflex.paths import Line, PointPath, Polygon
 from paraflex.results import summary, tracking_dataset
 from paraflex.studies import run_study, verify
 from paraflex.tracking import Ending, plan_tracking

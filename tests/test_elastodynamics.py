@@ -18,7 +18,6 @@ from paraflex.errors import ActuationError, InputError, IntegrationError
 from paraflex.fem import ReferenceCondition
 from paraflex.integrators import IntegrationOptions, integrate
 from paraflex.integrators.methods import GeneralisedAlpha
-from paraflex.kinematics import Line, PointPath
 from paraflex.mechanism import (
     Assembly,
     EndEffector,
@@ -33,6 +32,7 @@ from paraflex.mechanism import (
     SampledAngle,
     Section,
 )
+from paraflex.paths import Line, PointPath
 from paraflex.results import tracking_dataset
 from paraflex.results.links import tip_deflection
 from paraflex.tracking import plan_tracking

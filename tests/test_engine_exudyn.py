@@ -16,7 +16,6 @@ from paraflex.engines.exudyn import ExudynOptions, simulate_exudyn
 from paraflex.errors import InputError, IntegrationError
 from paraflex.fem import ReferenceCondition
 from paraflex.integrators import IntegrationOptions
-from paraflex.kinematics import Line
 from paraflex.mechanism import (
     Assembly,
     Curvature,
@@ -35,6 +34,7 @@ from paraflex.mechanism import (
     Section,
     TorsionalSpring,
 )
+from paraflex.paths import Line
 from paraflex.results.record import record
 from paraflex.tracking import plan_tracking
 from records import TIP

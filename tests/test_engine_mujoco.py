@@ -16,7 +16,6 @@ from paraflex.engines.mujoco import MuJoCoOptions, simulate_mujoco
 from paraflex.engines.tree import spanning_tree
 from paraflex.errors import InputError, IntegrationError
 from paraflex.integrators import IntegrationOptions
-from paraflex.kinematics import Line
 from paraflex.mechanism import (
     AppliedTorque,
     FlexibleBeam,
@@ -33,6 +32,7 @@ from paraflex.mechanism import (
     finite_segments,
     raparm_i,
 )
+from paraflex.paths import Line
 from paraflex.results import tracking_dataset
 from paraflex.results.record import record
 from paraflex.tracking import plan_tracking

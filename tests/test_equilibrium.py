@@ -13,7 +13,6 @@ from paraflex.fem import ReferenceCondition
 from paraflex.fem.element import TRANSVERSE
 from paraflex.files import load
 from paraflex.integrators import IntegrationOptions
-from paraflex.kinematics import Line
 from paraflex.mechanism import (
     AppliedTorque,
     Assembly,
@@ -34,6 +33,7 @@ from paraflex.mechanism import (
     raparm_i,
 )
 from paraflex.motion import simulate_motion
+from paraflex.paths import Line
 from paraflex.tracking import plan_tracking
 from test_loads import MASS, REACH, G, pendulum
 

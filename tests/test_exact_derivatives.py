@@ -15,8 +15,8 @@ from paraflex.errors import InputError
 from paraflex.fem import ReferenceCondition, SpanProperties, beam_integrals, mesh_beam, modal_basis
 from paraflex.fem.assumed import AssumedShapes, Polynomial, Sine, assumed_integrals
 from paraflex.fem.eigen import eigen_derivatives, eigenpairs
-from paraflex.kinematics import Circle, Line, Polygon
 from paraflex.mechanism import AssumedModesBeam, Material, Section, raparm_i
+from paraflex.paths import Circle, Line, Polygon
 from paraflex.studies import load_sensitivities, sensitivities
 
 STENCIL = STENCILS[0]

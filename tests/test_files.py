@@ -4,8 +4,8 @@ import pytest
 
 from paraflex.errors import InputError
 from paraflex.files import library_file, library_names, load, load_path
-from paraflex.kinematics import Circle, PointPath, Polygon
 from paraflex.mechanism import raparm_i
+from paraflex.paths import Circle, PointPath, Polygon
 
 SOURCE = library_file("raparm_i").read_text(encoding="utf-8")
 

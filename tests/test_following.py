@@ -15,7 +15,6 @@ from paraflex.fem import ReferenceCondition
 from paraflex.files import load
 from paraflex.integrators import DeflectionLimit, IntegrationOptions
 from paraflex.integrators.event_functions import event_functions
-from paraflex.kinematics import Circle, Line, PointPath, Polygon, length_fraction
 from paraflex.mechanism import (
     Assembly,
     Curvature,
@@ -30,6 +29,7 @@ from paraflex.mechanism import (
     SlotJoint,
     raparm_i,
 )
+from paraflex.paths import Circle, Line, PointPath, Polygon, length_fraction
 from paraflex.results import load_results, save_results, summary, tracking_dataset
 from paraflex.results.following import below_tolerance_line, part_run
 from paraflex.results.formulas import drift_speed, vibration

@@ -11,8 +11,6 @@ from paraflex.dynamics import build_system, consistent_state, joint_coordinate
 from paraflex.dynamics.joint_coordinates import own_coordinate
 from paraflex.dynamics.rank import dependence
 from paraflex.errors import UnreachablePathError
-from paraflex.kinematics import follow_path, path_follower
-from paraflex.kinematics.paths import Line
 from paraflex.mechanism import (
     Assembly,
     EndEffector,
@@ -27,10 +25,12 @@ from paraflex.mechanism import (
     chain_of_segments,
     four_bars_in_a_row,
 )
+from paraflex.paths import follow_path, path_follower
+from paraflex.paths.paths import Line
 from paraflex.tracking import plan_tracking
 from paraflex.validity.numbers import mechanism_size
 
-DENSE = "paraflex.kinematics.closure.DENSE_ROWS", "paraflex.kinematics.reach.DENSE_ROWS"
+DENSE = "paraflex.paths.closure.DENSE_ROWS", "paraflex.paths.reach.DENSE_ROWS"
 # Dense and sparse results differ by rounding errors, which long rows of loops multiply by up to a thousand.
 SAME = 1e-10
 

@@ -19,7 +19,6 @@ from paraflex.dynamics.tangents import MotionPoint
 from paraflex.errors import InputError
 from paraflex.kernel.ode import accelerations
 from paraflex.kernel.packed import INDEX_1
-from paraflex.kinematics import Line
 from paraflex.linear import linearise, states_needed
 from paraflex.linear.coordinates import coordinates_of
 from paraflex.linear.linearise import ModelVariables, Ports, linear_model
@@ -40,6 +39,7 @@ from paraflex.mechanism import (
     Section,
     StrainGauge,
 )
+from paraflex.paths import Line
 from test_tangent import NAMES, STENCIL, TIME, mechanism
 
 # --- Against differences ----------------------------------------------------------------------------------------------

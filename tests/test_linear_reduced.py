@@ -9,10 +9,10 @@ import pytest
 import scipy
 
 import paraflex as pf
-from paraflex.kinematics import Line
 from paraflex.linear import linearise, reduce, states_needed
 from paraflex.linear.bases import craig_bampton, rubin
 from paraflex.mechanism import AccelerationSensor, FlexibleBeam, JointForceSensor, ModalDamping, StrainGauge
+from paraflex.paths import Line
 from test_linear import HELD, hub_beam, joints_of
 
 # A hundredth to the right of the imaginary axis: as if all vibrations were damped by one per cent.

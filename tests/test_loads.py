@@ -16,7 +16,6 @@ from paraflex.files import library_file, load
 from paraflex.integrators import IntegrationOptions, integrate
 from paraflex.kernel.bodies import body_terms, motion_forces, weight_work
 from paraflex.kernel.packed import make_scratch
-from paraflex.kinematics import Line
 from paraflex.mechanism import (
     AppliedTorque,
     Assembly,
@@ -36,6 +35,7 @@ from paraflex.mechanism import (
     TorsionalSpring,
     raparm_i,
 )
+from paraflex.paths import Line
 from paraflex.results import tracking_dataset
 from paraflex.tracking import plan_tracking
 from test_second_order import chain, random_state

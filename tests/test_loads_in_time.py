@@ -19,7 +19,6 @@ from paraflex.files import ExpressionProfile, allowing_outside, library_file, lo
 from paraflex.integrators import IntegrationOptions
 from paraflex.integrators.run import jump_times
 from paraflex.integrators.sensitivity import run_derivatives
-from paraflex.kinematics import Line
 from paraflex.mechanism import (
     AppliedTorque,
     Assembly,
@@ -44,6 +43,7 @@ from paraflex.mechanism import (
 )
 from paraflex.mechanism.profiles import Interpolation
 from paraflex.motion import simulate_motion
+from paraflex.paths import Line
 from paraflex.studies import load_sensitivities
 from paraflex.tracking import path_stops, plan_tracking
 from paraflex.validity.actions import implausible_actions

@@ -19,7 +19,6 @@ from paraflex.findings import Finding
 from paraflex.integrators import METHODS, IntegrationOptions
 from paraflex.integrators.methods import find_method
 from paraflex.integrators.spectra import tableau_of
-from paraflex.kinematics import Circle, follow_path
 from paraflex.mechanism import (
     FlexibleBeam,
     Mechanism,
@@ -31,6 +30,7 @@ from paraflex.mechanism import (
     finite_segments,
 )
 from paraflex.motion import simulate_motion
+from paraflex.paths import Circle, follow_path
 from paraflex.results import open_results
 from paraflex.studies import load_optimisation, load_sensitivities, load_sweep, sensitivities, sweep
 from paraflex.studies.compare import ComparisonOptions

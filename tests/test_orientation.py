@@ -7,7 +7,7 @@ import pytest
 
 from paraflex.errors import InputError
 from paraflex.files import load
-from paraflex.kinematics import PointPath, follow_path
+from paraflex.paths import PointPath, follow_path
 from paraflex.results import load_results
 from shell import paraflex
 

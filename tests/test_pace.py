@@ -11,9 +11,9 @@ from paraflex.files import load
 from paraflex.integrators import IntegrationOptions
 from paraflex.integrators.pace import Pace, too_slow
 from paraflex.integrators.run import Instant
-from paraflex.kinematics import Line
 from paraflex.mechanism import ModalDamping
 from paraflex.motion import simulate_motion
+from paraflex.paths import Line
 from paraflex.tracking import plan_tracking
 
 

@@ -8,7 +8,7 @@ import pytest
 import paraflex as pf
 from paraflex.errors import InputError
 from paraflex.files import load, load_path
-from paraflex.kinematics import Line, PointPath, SequencePath, TabulatedPath
+from paraflex.paths import Line, PointPath, SequencePath, TabulatedPath
 from paraflex.tracking import plan_tracking
 from test_loads import five_bar
 

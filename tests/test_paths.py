@@ -10,7 +10,7 @@ import pytest
 
 from paraflex.arguments import with_fields
 from paraflex.errors import InputError
-from paraflex.kinematics import (
+from paraflex.paths import (
     Circle,
     CruiseProfile,
     Line,

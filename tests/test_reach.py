@@ -7,7 +7,6 @@ import pytest
 
 from paraflex.errors import AssemblyError, UnreachablePathError
 from paraflex.files import load
-from paraflex.kinematics import Circle, Line, PointPath, follow_path, reach_shortfall
 from paraflex.mechanism import (
     Assembly,
     EndEffector,
@@ -19,6 +18,7 @@ from paraflex.mechanism import (
     RigidBody,
     SampledAngle,
 )
+from paraflex.paths import Circle, Line, PointPath, follow_path, reach_shortfall
 
 UPPER, LOWER, BASE = 0.4, 0.3, np.array([0.1, 0.0])
 # Of distances: the nearest pose is a minimum, found to the root of rounding; of a second-order difference besides.

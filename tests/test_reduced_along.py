@@ -9,8 +9,8 @@ import pytest
 import scipy
 
 import paraflex as pf
-from paraflex.kinematics import Line
 from paraflex.linear.bases import interpolated
+from paraflex.paths import Line
 from paraflex.results import load_results, reduction_summary
 from shell import paraflex
 

@@ -15,7 +15,7 @@ from paraflex.control.laws.controllers import Plant
 from paraflex.control.laws.estimators import kalman_filter, riccati
 from paraflex.control.loop.chain import SampledController
 from paraflex.errors import InputError
-from paraflex.kinematics import Line
+from paraflex.paths import Line
 from rotors import rotor
 
 # Quanser's arm with flexible links, first stage: a steel beam of 3 x 0.050 in, 0.202 m; repository

@@ -12,7 +12,6 @@ from paraflex.dynamics import build_system, consistent_state
 from paraflex.dynamics.state import mass_matrix
 from paraflex.errors import InputError
 from paraflex.integrators import IntegrationOptions
-from paraflex.kinematics import Line
 from paraflex.mechanism import (
     Assembly,
     FlexibleBeam,
@@ -28,6 +27,7 @@ from paraflex.mechanism import (
     proportional_segments,
     raparm_i,
 )
+from paraflex.paths import Line
 from paraflex.results import tracking_dataset
 from paraflex.results.record import record
 from paraflex.tracking import plan_tracking

@@ -12,7 +12,7 @@ import paraflex as pf
 from paraflex.errors import InputError
 from paraflex.files import load_path
 from paraflex.integrators.sensitivity import run_derivatives
-from paraflex.kinematics import turning_of
+from paraflex.paths import turning_of
 from paraflex.studies import load_sensitivities
 from shell import paraflex
 from test_paths import PATHS, TABLES
@@ -177,7 +177,7 @@ class Rushed:
 
     def evaluate(self, t):
         t = np.minimum(t, 0.5)[:, None]
-        return pf.kinematics.PathMotion(t**2 * [1.0, 0.0], 2 * t * [1.0, 0.0], np.where(t < 0.5, 2.0, 0.0) * [1.0, 0.0])
+        return pf.paths.PathMotion(t**2 * [1.0, 0.0], 2 * t * [1.0, 0.0], np.where(t < 0.5, 2.0, 0.0) * [1.0, 0.0])
 
 
 def test_a_path_rests_before_its_start():

@@ -11,7 +11,6 @@ from paraflex.dynamics.rank import dependence
 from paraflex.errors import AssemblyError
 from paraflex.files import load
 from paraflex.integrators import IntegrationOptions
-from paraflex.kinematics import Polygon, follow_path
 from paraflex.mechanism import (
     Assembly,
     ConstantSpeed,
@@ -29,6 +28,7 @@ from paraflex.mechanism import (
     WeldJoint,
 )  # fmt: skip
 from paraflex.motion import simulate_motion
+from paraflex.paths import Polygon, follow_path
 from paraflex.results import motion_dataset
 from paraflex.tracking import plan_tracking
 

@@ -118,7 +118,7 @@ WORK = (
     "paraflex.dynamics.system.build_system",
     "paraflex.fem.eigen.eigenpairs",
     "paraflex.dynamics.linearise.natural_frequencies",
-    "paraflex.kinematics.closure.path_follower",
+    "paraflex.paths.closure.path_follower",
 )
 
 

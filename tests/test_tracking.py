@@ -8,9 +8,9 @@ import pytest
 from paraflex.errors import ActuationError, IntegrationError
 from paraflex.fem import ReferenceCondition
 from paraflex.integrators import METHODS, IntegrationOptions
-from paraflex.kinematics import Circle, Line, PointPath, Polygon
 from paraflex.mechanism import Curvature, FlexibleBeam, Material, raparm_i
 from paraflex.mechanism.raparm import TABLE_1
+from paraflex.paths import Circle, Line, PointPath, Polygon
 from paraflex.results import tracking_dataset
 from paraflex.studies import run_study
 from paraflex.tracking import plan_tracking, simulate

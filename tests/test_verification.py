@@ -10,8 +10,8 @@ from paraflex import plots
 from paraflex.engines.exudyn import simulate_exudyn
 from paraflex.errors import InputError
 from paraflex.integrators import IntegrationOptions
-from paraflex.kinematics import Line
 from paraflex.mechanism import proportional_segments, raparm_i
+from paraflex.paths import Line
 from paraflex.results import load_results, save_results, tracking_dataset
 from paraflex.studies import verify
 from paraflex.studies.agreement import Refinement, reference_model

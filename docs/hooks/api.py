@@ -19,7 +19,7 @@ PACKAGES = (
     "checks.drawing",
     "findings",
     "mechanism",
-    "kinematics",
+    "paths",
     "actuation",
     "tracking",
     "motion",

@@ -54,7 +54,7 @@ from .mechanism import (
 )
 
 # Paths
-from .kinematics import (
+from .paths import (
     Circle as Circle,
     Line as Line,
     PointPath as PointPath,

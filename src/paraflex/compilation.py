@@ -26,8 +26,8 @@ from .kernel.notice import LOG, announce_compiling
 from .kernel.packed import make_scratch
 from .kernel.plain import PLAIN, STATE, SUPPLIED
 from .kernel.processor import processor
-from .kinematics import Line
 from .mechanism import FlexibleBeam, Geometry, Material, Mechanism, Section, raparm_i
+from .paths import Line
 from .tracking import plan_tracking
 
 # Script of each child process; its first action makes it end with the parent.

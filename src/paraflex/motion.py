@@ -28,10 +28,10 @@ from .errors import AssemblyError, InputError, IntegrationError, ResultWarning
 from .findings import Finding, warn_of
 from .integrators import IntegrationOptions, Method, Solution, check_times, choose, integrate
 from .kernel.packed import Signals
-from .kinematics import ModelWithPaths
 from .mechanism import Mechanism, Start, TimeProfile
 from .mechanism.loads import InTime, value_in_time
 from .mechanism.quantities import known
+from .paths import ModelWithPaths
 from .validity import Validity, assess, implausible_results, large_rotations, warn, with_likely_cause
 
 # Remedy for a balanced start that is not found.

@@ -38,9 +38,9 @@ from .findings import Finding, warn_of
 from .integrators import IntegrationOptions, Method, Solution, check_times, choose
 from .integrators.beam_ends import leave_beam
 from .integrators.between import SAMPLES
-from .kinematics import ModelWithPaths, Path, RigidMotion, path_follower
 from .mechanism import ActuationMode, Mechanism, finite_segments, parse_mode, standing
 from .mechanism.profiles import stops
+from .paths import ModelWithPaths, Path, RigidMotion, path_follower
 from .validity import Driven, Following, Validity, assess, implausible_results, warn, with_likely_cause
 
 # Times closer than this fraction of the run are merged: a knot beside a sample would force a step of almost zero
@@ -349,7 +349,7 @@ def plan_tracking(
     Raises
     ------
     InputError, AssemblyError, UnreachablePathError
-        See `kinematics.follow_path`; a path that moves a sliding point off its beam, where `at_end` is "error".
+        See `paths.follow_path`; a path that moves a sliding point off its beam, where `at_end` is "error".
     """
     source, mechanism = mechanism, Mechanism.from_source(mechanism)
     if isinstance(path, str):

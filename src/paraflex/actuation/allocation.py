@@ -16,8 +16,8 @@ from paraflex.errors import ActuationError, Moment, SingularActuationError
 from paraflex.kernel.arrays import apart
 from paraflex.kernel.bodies import motion_forces
 from paraflex.kernel.packed import make_scratch
-from paraflex.kinematics import RigidMotion
 from paraflex.mechanism import ActuationMode, with_actuators
+from paraflex.paths import RigidMotion
 
 # Ratio of smallest to largest singular value below which a set of motors cannot drive the mechanism.
 SINGULAR_RATIO = 1e-6

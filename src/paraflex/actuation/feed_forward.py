@@ -9,8 +9,8 @@ import numpy as np
 from paraflex.arrays import Array
 from paraflex.dynamics import InputSignals
 from paraflex.errors import Moment, NumericalError
-from paraflex.kinematics import RigidMotion
 from paraflex.mechanism import ActuationMode
+from paraflex.paths import RigidMotion
 from .allocation import PAST_SINGULAR, Effort, allocate, required_effort
 from .quintic import DEGREE, quintic_splines
 

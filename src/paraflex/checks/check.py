@@ -19,10 +19,10 @@ from paraflex.files import Model, load
 from paraflex.files.schema import ModelTable
 from paraflex.findings import Finding, Verdict
 from paraflex.integrators import loose_tolerance
-from paraflex.kinematics import Circle, Path
 from paraflex.mechanism import ActuationMode, Mechanism, Start, TimeProfile, standing
 from paraflex.mechanism.loads import InTime
 from paraflex.mechanism.profiles import PiecewiseProfile, TabulatedProfile, marks
+from paraflex.paths import Circle, Path
 from paraflex.tracking import TrackingTask
 from paraflex.units import without_quantities
 from paraflex.validity.actions import LOADED_AT_REST

@@ -18,8 +18,8 @@ from paraflex.errors import InputError
 from paraflex.files import Model
 from paraflex.folders import ResultsFolder
 from paraflex.integrators import IntegrationOptions
-from paraflex.kinematics import Path
 from paraflex.mechanism import ActuationMode, Geometry, Mechanism, proportional_segments
+from paraflex.paths import Path
 from paraflex.reduced_bodies import AUTO, Reduction, reduced_task
 from paraflex.results.findings import keep_findings, verdict_of
 from paraflex.studies.tracking import Simulator, StudyResult, TrackingStudy

@@ -12,8 +12,8 @@ from paraflex.control import ControllerDescription
 from paraflex.figures.laws import law_table
 from paraflex.files import Model
 from paraflex.folders import LAW_COMPARISON
-from paraflex.kinematics import Path
 from paraflex.mechanism import ActuationMode
+from paraflex.paths import Path
 from paraflex.results.following import ErrorSpan
 from paraflex.results.metrics import VALIDITY
 from paraflex.studies.law_comparison import LawComparison

@@ -30,7 +30,6 @@ from paraflex.errors import AssemblyError, InputError, ProportionError
 from paraflex.files import Model, library_names, load
 from paraflex.findings import Finding, Level
 from paraflex.formatting import number, speed_text
-from paraflex.kinematics import follow_path
 from paraflex.mechanism import (
     Actuator,
     AppliedTorque,
@@ -45,6 +44,7 @@ from paraflex.mechanism import (
     grouped,
     loops,
 )
+from paraflex.paths import follow_path
 from .collected import printed
 from .commands.models import InfoRequest
 from .inspect_tables import print_facts, print_library

@@ -13,10 +13,10 @@ from paraflex.errors import ActuationError, AssemblyError, InputError
 from paraflex.files import Model, library_names
 from paraflex.files.fields import number_in
 from paraflex.formatting import number, quantity
-from paraflex.kinematics import pose_at
 from paraflex.linear import LinearModel, linearise
 from paraflex.mechanism import ActuationMode, Mechanism
 from paraflex.motion import UNBALANCED, MotionRun, simulate_motion
+from paraflex.paths import pose_at
 from paraflex.results.linear_data import motors_of
 from paraflex.tracking import TrackingRun, TrackingTask
 from .commands.models import LinearRequest

@@ -11,8 +11,8 @@ from paraflex.errors import AssemblyError, InputError, UnreachablePathError, ren
 from paraflex.files import Model, load, load_path
 from paraflex.files.outside import may_be_outside
 from paraflex.files.overlay import value_of
-from paraflex.kinematics import Path as EndEffectorPath
 from paraflex.mechanism import ActuationMode, Mechanism
+from paraflex.paths import Path as EndEffectorPath
 from paraflex.tracking import TrackingTask
 from paraflex.validity import likely_cause
 from .commands.options import FramesChoice, ModelChoice, PlanChoice

@@ -17,10 +17,10 @@ from paraflex.dynamics import State
 from paraflex.dynamics.points import marker_position
 from paraflex.errors import InputError, IntegrationError
 from paraflex.integrators import IntegrationOptions, Method
-from paraflex.kinematics import ModelWithPaths
 from paraflex.mechanism import ActuationMode, Mechanism, Start
 from paraflex.mechanism.measured import encoders_of, measured_sensors
 from paraflex.mechanism.quantities import all_known, known, not_negative, positive
+from paraflex.paths import ModelWithPaths
 from paraflex.tracking import TrackingTask
 from .laws.estimators import rounded
 from .loop.references import readings_of

@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, Any
 from paraflex.arguments import checked_arguments
 from paraflex.arrays import Array, Numbers
 from paraflex.errors import as_enum
-from paraflex.kinematics import ModelWithPaths
 from paraflex.limits import ENVIRONMENTS, at_most
 from paraflex.mechanism import Mechanism
 from paraflex.mechanism.quantities import positive
+from paraflex.paths import ModelWithPaths
 from paraflex.tracking import TrackingTask
 from .environment import Environment, within
 

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple, Protocol
 
 from paraflex.errors import InputError, suggestion
-from paraflex.kinematics import ModelWithPaths
 from paraflex.mechanism import Mechanism, PointRef
 from paraflex.mechanism.quantities import known, optional
+from paraflex.paths import ModelWithPaths
 
 _AXES = ("x", "y", "angle")
 # Fields of loads and displacements; choosing one of them replaces all.

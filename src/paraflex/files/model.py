@@ -11,10 +11,10 @@ from paraflex.control.shaping.shaped import shape_torques
 from paraflex.equilibria.conditions import StaticsDefaults, conditions
 from paraflex.errors import InputError, renamed, suggestion, within
 from paraflex.findings import warn_of
-from paraflex.kinematics import Path
 from paraflex.late import save_file
 from paraflex.mechanism import ActuationMode, Mechanism, Start, parse_mode, standing
 from paraflex.mechanism.quantities import known
+from paraflex.paths import Path
 from paraflex.tracking import Ending, TrackingTask, plan_tracking
 from paraflex.validity import implausible_numbers
 from paraflex.writing import write_text

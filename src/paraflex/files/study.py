@@ -7,10 +7,10 @@ from typing import Any, Literal
 from paraflex.control.shaping.shapers import Shaper
 from paraflex.errors import InputError, renamed, within
 from paraflex.integrators import DEFAULT_METHOD, IntegrationOptions, check_times, find_method
-from paraflex.kinematics import Path
 from paraflex.mechanism import Mechanism, parse_mode
 from paraflex.mechanism.loads import InTime
 from paraflex.mechanism.quantities import known, optional
+from paraflex.paths import Path
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,6 @@ from typing import Any
 from paraflex.control.shaping.shaped import ShapedPath
 from paraflex.control.shaping.shapers import Shaper
 from paraflex.errors import InputError, within
-from paraflex.kinematics import Path, SequencePath, TabulatedPath
 from paraflex.mechanism import (
     AppliedTorque,
     Assembly,
@@ -32,6 +31,7 @@ from paraflex.mechanism import (
 )
 from paraflex.mechanism.bodies import BODY_KINDS
 from paraflex.mechanism.quantities import joint_pair
+from paraflex.paths import Path, SequencePath, TabulatedPath
 from .controllers import controller_table
 from .field_values import changed_fields, inexpressible
 from .profiles import components_table, profile_parameters, profile_table

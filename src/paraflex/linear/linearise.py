@@ -17,12 +17,12 @@ from paraflex.dynamics import State, System, pose_at_rest, sensor_rows, standing
 from paraflex.dynamics.points import marker_place
 from paraflex.dynamics.tangents import MotionPoint
 from paraflex.errors import InputError, as_enum
-from paraflex.kinematics import ModelWithPaths
 from paraflex.limits import solvable
 from paraflex.mechanism import ActuationMode, Mechanism, PointRef, Sensor, Start, in_frames, parse_mode
 from paraflex.mechanism.checks import known_point
 from paraflex.mechanism.measured import measured_sensors
 from paraflex.motion import MotionRun
+from paraflex.paths import ModelWithPaths
 from paraflex.tracking import TrackingRun, TrackingTask
 from .coordinates import CoordinateChoice, Coordinates, FirstCoordinates, Variable, coordinates_of
 from .minimal import MinimalEquations

@@ -15,10 +15,10 @@ from paraflex.arrays import Array, Indices
 from paraflex.dynamics import State
 from paraflex.dynamics.state_space import StateSpace
 from paraflex.errors import InputError, as_enum
-from paraflex.kinematics import ModelWithPaths
 from paraflex.limits import solvable
 from paraflex.mechanism import ActuationMode, Mechanism, Start
 from paraflex.motion import MotionRun
+from paraflex.paths import ModelWithPaths
 from paraflex.tracking import TrackingRun, TrackingTask
 from .bases import Basis, carried, craig_bampton, independent_rows, interpolated, lowest_modes, rubin
 from .coordinates import Variable

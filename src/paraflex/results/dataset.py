@@ -11,7 +11,7 @@ from paraflex.control.laws.joints import internal_torques
 from paraflex.errors import InputError, as_enum
 from paraflex.findings import Finding
 from paraflex.integrators import IntegrationOptions
-from paraflex.kinematics import Path, length_fraction
+from paraflex.paths import Path, length_fraction
 from paraflex.tracking import TrackingRun
 from paraflex.validity import beyond_range, implausible_numbers
 from .acting import load_variables

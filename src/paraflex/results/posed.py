@@ -11,8 +11,8 @@ from paraflex.dynamics.projection import joint_gaps, row_unit
 from paraflex.dynamics.rank import joint_of_row
 from paraflex.errors import InputError, NumericalError
 from paraflex.formatting import number
-from paraflex.kinematics import Path, follow_path
 from paraflex.mechanism import Mechanism, PointRef, Start
+from paraflex.paths import Path, follow_path
 from .acting import first_movements, first_movements_along
 from .drawing import DrawnRun, drawing_data, system_drawing
 

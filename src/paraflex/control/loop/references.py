@@ -11,11 +11,11 @@ from paraflex.arrays import Array
 from paraflex.control.laws.controllers import Plant
 from paraflex.dynamics.sensors import SensorReader
 from paraflex.errors import InputError
-from paraflex.kinematics import RigidMotion
 from paraflex.mechanism import Mechanism, TimeProfile
 from paraflex.mechanism.measured import measured_sensors
 from paraflex.mechanism.quantities import all_known
 from paraflex.motion import MotionRun
+from paraflex.paths import RigidMotion
 from paraflex.tracking import TrackingRun
 from .together import OPEN_LOOP, PLAN
 

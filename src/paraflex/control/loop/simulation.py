@@ -20,11 +20,11 @@ from paraflex.findings import warn_of
 from paraflex.integrators import IntegrationOptions, Method, Solution, Treatment, choose
 from paraflex.integrators.integration import Integration, IntegrationState
 from paraflex.kernel.sampled import SampledLaw
-from paraflex.kinematics import ModelWithPaths
 from paraflex.mechanism import ActuationMode, Mechanism, Start, mode_of_motors, parse_mode
 from paraflex.mechanism.measured import encoders_of, measured_sensors
 from paraflex.mechanism.quantities import finite
 from paraflex.motion import motion_start
+from paraflex.paths import ModelWithPaths
 from paraflex.tracking import Ending, TrackingTask
 from paraflex.validity import warn, with_likely_cause
 from .held import HeldTorques, Torques

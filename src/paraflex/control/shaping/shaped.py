@@ -9,8 +9,8 @@ from paraflex.actuation import FeedForward, TorquePlan, plan_torques, required_e
 from paraflex.arguments import CheckedFields, checked_arguments
 from paraflex.arrays import Array
 from paraflex.errors import InputError
-from paraflex.kinematics import Path, PathFollower, PathMotion, turning_of
 from paraflex.mechanism import ActuationMode
+from paraflex.paths import Path, PathFollower, PathMotion, turning_of
 from paraflex.tracking import TrackingTask, path_knots
 from .shapers import Shaper
 

@@ -30,11 +30,11 @@ from paraflex.integrators.sensitivity import Direction
 from paraflex.kernel.arrays import apart
 from paraflex.kernel.bodies import motion_forces
 from paraflex.kernel.packed import Signals, make_scratch
-from paraflex.kinematics import Circle, PathMotion, Polygon, RigidMotion
-from paraflex.kinematics.closure import PathClosure, with_marker
-from paraflex.kinematics.paths import KnownPath
-from paraflex.kinematics.sensitivity import DisplacedClosure, MotionChange, motion_sensitivity
 from paraflex.mechanism import ActuationMode, FlexibleBeam, Mechanism, RigidBody, with_actuators
+from paraflex.paths import Circle, PathMotion, Polygon, RigidMotion
+from paraflex.paths.closure import PathClosure, with_marker
+from paraflex.paths.paths import KnownPath
+from paraflex.paths.sensitivity import DisplacedClosure, MotionChange, motion_sensitivity
 from paraflex.tracking import TrackingTask, path_knots
 from .plans import RunInputs
 from .stencil import STENCILS, Difference, Stencil

@@ -19,9 +19,9 @@ from paraflex.control.laws.law import Law, StartedLaw, given
 from paraflex.dynamics import joint_coordinate
 from paraflex.errors import InputError
 from paraflex.kernel.closure import LOOPS_CLOSED
-from paraflex.kinematics import RigidMotion
-from paraflex.kinematics.closure import PathClosure
 from paraflex.mechanism.quantities import all_listed, positive
+from paraflex.paths import RigidMotion
+from paraflex.paths.closure import PathClosure
 
 # The iteration for the position has converged at a change below this fraction of the mechanism's size; largest number
 # of iterations.
