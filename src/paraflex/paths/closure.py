@@ -8,34 +8,22 @@ from functools import cached_property
 import numpy as np
 
 from paraflex.arguments import checked_arguments
-from paraflex.arrays import Array, Indices, Mask
-from paraflex.dynamics import (
-    System,
-    assembled_position,
-    build_system,
-    records,
-    redundant_rows,
-    reference_pose,
-    still_signals,
-)
+from paraflex.arrays import Array, Mask
+from paraflex.dynamics import System, assembled_position, redundant_rows, reference_pose
 from paraflex.dynamics.points import point_motion
-from paraflex.dynamics.system import DENSE_ROWS
 from paraflex.errors import AssemblyError, InputError, Moment, NumericalError, UnreachablePathError
 from paraflex.kernel.arrays import apart
-from paraflex.kernel.closure import LOOPS_CLOSED, LOOPS_SINGULAR, close_path, make_closure_scratch, task_values
-from paraflex.kernel.packed import MARKER, PackedSystem, Signals
+from paraflex.kernel.closure import LOOPS_CLOSED, task_values
 from paraflex.limits import INSTANTS, solvable
-from paraflex.mechanism import Assembly, Mechanism, PointRef, with_actuators
+from paraflex.mechanism import Assembly, Mechanism
 from paraflex.mechanism.members import TASK_COORDINATES
 from paraflex.mechanism.poses import local_points
+from .loops import LoopClosure
 from .paths import KnownPath, Path, PathMotion, turning_of
 from .reach import PoseSearch, Shortfall
-from .sparse_closure import SparseClosure
 
 # Closure proceeds along the path in steps no longer than this [s], for any requested times.
 _LONGEST_STEP = 1e-3
-# Number of pieces of a step that is too long, divided repeatedly down to the shortest step [s].
-_STEP_PIECES, _SHORTEST_STEP = 16, 1e-8
 # Numbers of steps from the assembly's pose to the start of the path, tried in turn.
 _APPROACHES = (25, 250, 2500)
 # Evenly spaced instants at which the distance of an unreachable path from the workspace is computed, besides the knots
@@ -288,25 +276,15 @@ def _no_long_steps(times: Array) -> tuple[Array, Mask]:
     return grid, keep
 
 
-class PathClosure:
+class PathClosure(LoopClosure):
     """Rigid system with its task marker, whose loops are closed along a path."""
-
-    packed: PackedSystem
-    marker: int
 
     def __init__(self, mechanism: Mechanism, orientation: float, end: float) -> None:
         effector = mechanism.end_effector
         assert effector is not None
-        self.mechanism = mechanism
-        # Springs, dampers and friction are not constraints.
-        moved = with_actuators(mechanism)
-        acts = moved.springs or moved.dampers or moved.frictions
-        self.system: System = build_system(replace(moved, springs=(), dampers=(), frictions=()) if acts else moved)
+        names = [TASK_COORDINATES.index(name) for name in effector.coordinates]
+        super().__init__(mechanism, end, effector.point, np.array(names))
         self.orientation = orientation
-        end = end if end > 0.0 else 1.0
-        self.signals: Signals = still_signals(self.system.mechanism, end)[0]
-        self.coordinates: Indices = np.array([TASK_COORDINATES.index(name) for name in effector.coordinates])
-        self.packed, self.marker = with_marker(self.system, effector.point)
         self.reach: PoseSearch = PoseSearch(self.system, effector.point, self.coordinates, self.signals)
 
     def check_degrees_of_freedom(self, assembly: Assembly) -> None:
@@ -348,19 +326,6 @@ class PathClosure:
         full = np.concatenate([np.stack(motion), turning[:, :, None]], axis=2)
         return np.ascontiguousarray(full[:, :, self.coordinates].transpose(1, 0, 2))
 
-    def run(self, times: Array, target: Array, pose: Array) -> tuple[int, int, tuple[Array, Array, Array, Array]]:
-        """Close the loops along targets; return status, index, and the computed arrays."""
-        k, n = times.size, self.system.n
-        q, v, a = apart((3, k, n))
-        basis = apart((k, n, self.coordinates.size))
-        q[0] = pose
-        if self.system.m > DENSE_ROWS:
-            return *self._sparse.run(times, target, q, v, a, basis), (q, v, a, basis)
-        scratch = make_closure_scratch(self.packed, self.coordinates.size, self.signals.start.size)
-        given = (self.packed, self.signals, self.marker, self.coordinates, times, target)
-        status, index = close_path(*given, q, v, a, basis, scratch)
-        return status, int(index), (q, v, a, basis)
-
     def approach(self, path: Path, pose: Array, start: float, end: float) -> Array:
         """Move the end-effector from the assembly to the start of the path, staying in that assembly."""
         goal = self.target(path, np.array([start]))[0, 0]
@@ -382,28 +347,13 @@ class PathClosure:
 
     def walk(self, path: Path, pose: Array, grid: Array, keep: Mask) -> RigidMotion:
         """Return the motion at the instants of a grid, with further instants where steps are too long."""
-        intervals = []
-        while True:
-            target = self.target(path, grid)
-            status, index, found = self.run(grid, target, pose)
-            last = index - 1
-            if status in (LOOPS_CLOSED, LOOPS_SINGULAR) or last < 0 or grid[index] - grid[last] < _SHORTEST_STEP:
-                break
-            # Continue from the last instant reached, in shorter steps.
-            intervals.append([x[:last][keep[:last]] for x in (grid, *found)])
-            pose = found[0][last]
-            between = np.linspace(grid[last], grid[index], _STEP_PIECES + 1)[1:-1]
-            grid = np.concatenate([grid[last:index], between, grid[index:]])
-            keep = np.concatenate([keep[last:index], np.zeros(between.size, bool), keep[index:]])
-        intervals.append([x[:index][keep[:index]] for x in (grid, *found)])
-        motion = RigidMotion(
-            self.mechanism, self.system, path, *(np.concatenate(parts) for parts in zip(*intervals, strict=True))
-        )
-        if status == LOOPS_CLOSED:
+        found = self.follow(lambda times: self.target(path, times), grid, keep, pose)
+        motion = RigidMotion(self.mechanism, self.system, path, *found.arrays)
+        if found.closed:
             return motion
-        at = float(grid[index])
+        at = found.stopped
         # The Jacobian is singular as well where the path leaves the workspace, but beyond it no loop closes.
-        found = self.shortfall(path, at, float(grid[-1]), pose if last < 0 else found[0][last])
+        found = self.shortfall(path, at, float(grid[-1]), found.last)
         cause, detail = "the path passes a Type I singularity", _NEARLY_SINGULAR
         if np.any(found.out[found.t <= at + _SOON * (found.t[-1] - at)]):
             cause, detail = "the path goes out of reach", ""
@@ -427,10 +377,6 @@ class PathClosure:
     def distances(self, path: Path, times: Array, pose: Array) -> Shortfall:
         """Return the distances of a path from the workspace at some times, from a pose or the assemblies that close."""
         return self.reach.shortfall(times, self.target(path, times)[:, 0], pose, self._other_poses)
-
-    @cached_property
-    def _sparse(self) -> SparseClosure:
-        return SparseClosure(self.system, self.packed, self.signals, self.marker, self.coordinates)
 
     @cached_property
     def _other_poses(self) -> list[Array]:
@@ -461,13 +407,3 @@ class PathClosure:
             cause, Moment(at, step, place), partial, _MOVE_PATH, detail=detail,
             shortfall=float(np.max(found.distance)), shortfall_angle=float(np.max(found.turn)),
         )  # fmt: skip
-
-
-def with_marker(system: System, ref: PointRef) -> tuple[PackedSystem, int]:
-    """Return the packed system with one more marker, for a point not at a joint; rigid, hence without shape rows."""
-    marker = system.marker(ref)
-    x, y = marker.x0
-    record = records(MARKER, [{"body": marker.body, "bending": -1, "x": x, "y": y}])
-    kind = max(system.packed.markers.dtype, record.dtype, key=lambda dtype: dtype.itemsize)
-    markers = np.concatenate([system.packed.markers.astype(kind), record.astype(kind)])
-    return system.packed._replace(markers=markers), markers.size - 1

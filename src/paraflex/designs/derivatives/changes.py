@@ -32,7 +32,8 @@ from paraflex.kernel.bodies import motion_forces
 from paraflex.kernel.packed import Signals, make_scratch
 from paraflex.mechanism import ActuationMode, FlexibleBeam, Mechanism, RigidBody, with_actuators
 from paraflex.paths import Circle, PathMotion, Polygon, RigidMotion
-from paraflex.paths.closure import PathClosure, with_marker
+from paraflex.paths.closure import PathClosure
+from paraflex.paths.loops import with_marker
 from paraflex.paths.paths import KnownPath
 from paraflex.paths.sensitivity import DisplacedClosure, MotionChange, motion_sensitivity
 from paraflex.tracking import TrackingTask, path_knots

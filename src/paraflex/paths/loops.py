@@ -1,0 +1,128 @@
+"""Closure of the loops of a rigid mechanism at ascending times, by Newton's iteration from each pose to the next."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from paraflex.arrays import Array, Indices, Mask
+from paraflex.dynamics import System, build_system, records, still_signals
+from paraflex.dynamics.system import DENSE_ROWS
+from paraflex.kernel.arrays import apart
+from paraflex.kernel.closure import LOOPS_CLOSED, LOOPS_SINGULAR, close_path, make_closure_scratch
+from paraflex.kernel.packed import MARKER, PackedSystem, Signals
+from paraflex.mechanism import Mechanism, PointRef, with_actuators
+from .sparse_closure import SparseClosure
+
+# Number of pieces of a step that is too long, divided repeatedly down to the shortest step [s].
+_STEP_PIECES, _SHORTEST_STEP = 16, 1e-8
+
+
+@dataclass(frozen=True)
+class ClosedLoops:
+    """Motion as far as the loops close.
+
+    Attributes
+    ----------
+    arrays : tuple of array
+        Times (k,), coordinates, velocities and accelerations (k, n), basis (k, n, tasks), at the requested instants.
+    closed : bool
+        Whether all requested instants were reached.
+    stopped : float
+        Time at which the loops did not close [s].
+    last : (n,) array
+        Last pose with closed loops.
+    """
+
+    arrays: tuple[Array, Array, Array, Array, Array]
+    closed: bool
+    stopped: float
+    last: Array
+
+
+class LoopClosure:
+    """Rigid system whose loops are closed with as many task coordinates of a point given as its drives leave free.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+        Rigid mechanism.
+    end : float
+        Last time [s].
+    point : PointRef, optional
+        Point with the task coordinates; None if prescribed motions determine the motion.
+    coordinates : (tasks,) array
+        Task coordinates: 0 for x, 1 for y, 2 for the angle.
+    """
+
+    packed: PackedSystem
+    marker: int
+
+    def __init__(self, mechanism: Mechanism, end: float, point: PointRef | None, coordinates: Indices) -> None:
+        self.mechanism = mechanism
+        # Springs, dampers and friction are not constraints.
+        moved = with_actuators(mechanism)
+        acts = moved.springs or moved.dampers or moved.frictions
+        self.system: System = build_system(replace(moved, springs=(), dampers=(), frictions=()) if acts else moved)
+        self.signals: Signals = still_signals(self.system.mechanism, end if end > 0.0 else 1.0)[0]
+        self.coordinates = coordinates
+        self.packed, self.marker = (self.system.packed, 0) if point is None else with_marker(self.system, point)
+
+    def run(self, times: Array, target: Array, pose: Array) -> tuple[int, int, tuple[Array, Array, Array, Array]]:
+        """Close the loops along targets; return status, index, and the computed arrays."""
+        k, n = times.size, self.system.n
+        q, v, a = apart((3, k, n))
+        basis = apart((k, n, self.coordinates.size))
+        q[0] = pose
+        if self.system.m > DENSE_ROWS:
+            return *self._sparse.run(times, target, q, v, a, basis), (q, v, a, basis)
+        scratch = make_closure_scratch(self.packed, self.coordinates.size, self.signals.start.size)
+        given = (self.packed, self.signals, self.marker, self.coordinates, times, target)
+        status, index = close_path(*given, q, v, a, basis, scratch)
+        return status, int(index), (q, v, a, basis)
+
+    def follow(self, target: Callable[[Array], Array], grid: Array, keep: Mask, pose: Array) -> ClosedLoops:
+        """Close the loops at the instants of a grid, with further instants where steps are too long.
+
+        Parameters
+        ----------
+        target : callable
+            Function that returns the task coordinates and two derivatives (times, 3, tasks) at times [s].
+        grid : (k,) array
+            Times, ascending [s].
+        keep : (k,) array of bool
+            Whether an instant was requested.
+        pose : (n,) array
+            Pose near the first instant.
+        """
+        intervals = []
+        while True:
+            status, index, found = self.run(grid, target(grid), pose)
+            last = index - 1
+            if status in (LOOPS_CLOSED, LOOPS_SINGULAR) or last < 0 or grid[index] - grid[last] < _SHORTEST_STEP:
+                break
+            # Continue from the last instant reached, in shorter steps.
+            intervals.append([x[:last][keep[:last]] for x in (grid, *found)])
+            pose = found[0][last]
+            between = np.linspace(grid[last], grid[index], _STEP_PIECES + 1)[1:-1]
+            grid = np.concatenate([grid[last:index], between, grid[index:]])
+            keep = np.concatenate([keep[last:index], np.zeros(between.size, bool), keep[index:]])
+        intervals.append([x[:index][keep[:index]] for x in (grid, *found)])
+        t, q, v, a, basis = (np.concatenate(parts) for parts in zip(*intervals, strict=True))
+        stopped = float(grid[min(index, grid.size - 1)])
+        return ClosedLoops((t, q, v, a, basis), status == LOOPS_CLOSED, stopped, pose if last < 0 else found[0][last])
+
+    @cached_property
+    def _sparse(self) -> SparseClosure:
+        return SparseClosure(self.system, self.packed, self.signals, self.marker, self.coordinates)
+
+
+def with_marker(system: System, ref: PointRef) -> tuple[PackedSystem, int]:
+    """Return the packed system with one more marker, for a point not at a joint; rigid, hence without shape rows."""
+    marker = system.marker(ref)
+    x, y = marker.x0
+    record = records(MARKER, [{"body": marker.body, "bending": -1, "x": x, "y": y}])
+    kind = max(system.packed.markers.dtype, record.dtype, key=lambda dtype: dtype.itemsize)
+    markers = np.concatenate([system.packed.markers.astype(kind), record.astype(kind)])
+    return system.packed._replace(markers=markers), markers.size - 1
