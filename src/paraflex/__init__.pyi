@@ -76,6 +76,14 @@ from .checks.drawing import draw as draw
 from .tracking import simulate as simulate
 from .motion import simulate_motion as simulate_motion
 
+# Kinematics and rigid torques
+from .driven import (
+    kinematics as kinematics,
+    torques as torques,
+    flywheel as flywheel,
+    DrivenMotion as DrivenMotion,
+)
+
 # Integration
 from .integrators import (
     methods as methods,

@@ -14,6 +14,7 @@ from paraflex.kernel.constraints import constraint_values, fill_jacobian
 from paraflex.kernel.packed import CONSTRAINT, PackedSystem, Signals, Workspace, make_scratch, make_workspace
 from paraflex.limits import solvable
 from paraflex.mechanism import Mechanism, PointRef, in_frames, rotor_mass, with_actuators
+from paraflex.mechanism.bodies import check_masses
 from .body_bases import is_reduced, reduced_body
 from .constraints import RowTerm, row_order, terms_by_joint
 from .coordinates import BodyCoordinates, Marker, PlacedBodies, body_coordinates
@@ -215,10 +216,11 @@ def build_system(mechanism: Mechanism, like: System | None = None) -> System:
     Raises
     ------
     InputError
-        The mass matrix of a body is not positive definite, or `reduced_body` fails.
+        A rigid body has no mass, the mass matrix of a body is not positive definite, or `reduced_body` fails.
     ProportionError
         The damping of a body cannot be computed, for numbers too far apart.
     """
+    check_masses(mechanism)
     mechanism = with_actuators(in_frames(mechanism))
     constraints = row_order(mechanism)
     modes = {} if like is None else {body.name: body.modes for body in like.bodies}

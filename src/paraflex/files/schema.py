@@ -366,7 +366,13 @@ class BeamTable(_table_of(FlexibleBeam, BODY_KINDS, reference=ReferenceName | No
 
 
 class RigidTable(_table_of(RigidBody, BODY_KINDS)):
-    """A rigid body."""
+    """A rigid body, also if its table has no `type` and only fields of rigid bodies."""
+
+
+def _with_type(value: Any) -> Any:
+    if isinstance(value, dict) and "type" not in value and value.keys() <= RigidTable.model_fields.keys():
+        return {"type": "rigid"} | value
+    return value
 
 
 class AssumedModesTable(_table_of(AssumedModesBeam, BODY_KINDS)):
@@ -608,9 +614,10 @@ class _Parts(_Table):
     material: dict[str, MaterialTable] = {}
     lump: dict[str, LumpTable] = {}
     ground: dict[str, Pair] = _optional("[x, y] of each ground point in m", {})
-    body: dict[str, Annotated[BeamTable | RigidTable | AssumedModesTable | ModalTable, Field(discriminator="type")]] = (
-        Field(description="at least one [body.NAME] table")
-    )
+    body: dict[str, Annotated[
+        BeamTable | RigidTable | AssumedModesTable | ModalTable, Field(discriminator="type"),
+        BeforeValidator(_with_type),
+    ]] = Field(description="at least one [body.NAME] table")  # fmt: skip
     joint: dict[str, JointEntry] = _optional(
         '["body.point", "body.point"] for each revolute joint, a table for others', {}
     )

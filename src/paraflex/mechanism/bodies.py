@@ -1,10 +1,10 @@
 """Rigid bodies, flexible beams and bars of assumed modes, with named points in the body frame."""
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import Enum
 from functools import cached_property
-from typing import TypeVar
+from typing import TYPE_CHECKING, TypeVar
 
 from paraflex.arguments import CheckedFields, named_in_errors
 from paraflex.errors import InputError
@@ -24,11 +24,13 @@ from .modal import DAMPING, MODES, DeformableBody, ModalBody
 from .quantities import field_metadata, finite, not_negative, optional, positive
 from .sections import Section
 
+if TYPE_CHECKING:
+    from .mechanism import Mechanism
+
 T = TypeVar("T")
 _LENGTH = field_metadata("the length in m", positive)
 _POINTS = "the distance of each named point from the start in m"
 _LUMPS = "the name of a [lump.NAME] table for each point"
-_ROD = ' (a rod without mass between two pins is a joint of type = "distance")'
 
 
 @dataclass(frozen=True)
@@ -102,7 +104,7 @@ class RigidBody(CheckedFields):
     name : str
         Name of the body.
     mass : float
-        Mass [kg].
+        Mass [kg]; by default none, which is enough for kinematics and drawings.
     inertia : float
         Moment of inertia about the centre of mass [kg m^2].
     centre_of_mass : (x, y)
@@ -114,10 +116,11 @@ class RigidBody(CheckedFields):
     _table = "body"
 
     name: str
-    mass: float = field(metadata=field_metadata("the mass in kg", positive, f"kg{_ROD}"))
-    inertia: float = field(
-        metadata=field_metadata("the moment of inertia about the centre of mass in kg m^2", positive, f"kg m^2{_ROD}")
-    )
+    mass: float = optional(0.0, "the mass in kg, which kinematics does without", not_negative, "kg")
+    inertia: float = optional(
+        0.0, "the moment of inertia about the centre of mass in kg m^2, which kinematics does without", not_negative,
+        "kg m^2",
+    )  # fmt: skip
     centre_of_mass: tuple[float, float] = optional((0.0, 0.0), "[x, y] in the body frame in m", finite)
     points: Mapping[str, tuple[float, float]] = optional({}, "[x, y] of each named point in the body frame in m")
 
@@ -340,3 +343,30 @@ named_in_errors("a body")(Body)
 def given_shapes(bodies: Iterable[Body]) -> list[str]:
     """Return the names of the flexible bodies with user-defined shapes, which have no mesh to refine."""
     return [body.name for body in bodies if isinstance(body, AssumedModesBeam | ModalBody) and body.flexible]
+
+
+def check_masses(mechanism: "Mechanism") -> None:
+    """Check that every rigid body has a mass and a moment of inertia.
+
+    Raises
+    ------
+    InputError
+        A body has none.
+    """
+    for body in mechanism.bodies:
+        for name, unit in (("mass", "kg"), ("inertia", "kg m^2")):
+            if isinstance(body, RigidBody) and not getattr(body, name):
+                raise InputError(
+                    "is missing or zero, and forces depend on it", field=f"body.{body.name}.{name}",
+                    remedy=f"give it in {unit}; kinematics does without, and a rod without mass between two pins is a "
+                    'joint of type = "distance"',
+                )  # fmt: skip
+
+
+def with_any_masses(mechanism: "Mechanism") -> "Mechanism":
+    """Return the mechanism with any masses where rigid bodies have none, for motions that do not depend on them."""
+    bodies = tuple(
+        replace(body, mass=body.mass or 1.0, inertia=body.inertia or 1.0)
+        if isinstance(body, RigidBody) and not (body.mass and body.inertia) else body for body in mechanism.bodies
+    )  # fmt: skip
+    return mechanism if bodies == mechanism.bodies else replace(mechanism, bodies=bodies)

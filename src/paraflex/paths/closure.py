@@ -9,7 +9,7 @@ import numpy as np
 
 from paraflex.arguments import checked_arguments
 from paraflex.arrays import Array, Mask
-from paraflex.dynamics import System, assembled_position, redundant_rows, reference_pose
+from paraflex.dynamics import System, redundant_rows
 from paraflex.dynamics.points import point_motion
 from paraflex.errors import AssemblyError, InputError, Moment, NumericalError, UnreachablePathError
 from paraflex.kernel.arrays import apart
@@ -191,7 +191,7 @@ def path_follower(
             "the path gives angles, but the task has none", field="end_effector.coordinates",
             value=list(mechanism.end_effector.coordinates), remedy='name "angle", or leave the angles out',
         )  # fmt: skip
-    return PathFollower(closure, closure.assemble(chosen), path)
+    return PathFollower(closure, closure.assembled(chosen), path)
 
 
 @dataclass(frozen=True)
@@ -293,7 +293,7 @@ class PathClosure(LoopClosure):
         if free == tasks:
             return
         with suppress(NumericalError):
-            repeated = redundant_rows(self.system, self.assemble(assembly))
+            repeated = redundant_rows(self.system, self.assembled(assembly))
         if free + len(repeated) == tasks:
             raise InputError(
                 f"redundant constraints ({', '.join(repeated)}): the joint motion along a path needs independent ones",
@@ -306,10 +306,6 @@ class PathClosure(LoopClosure):
             value=[TASK_COORDINATES[i] for i in self.coordinates],
             remedy="name as many task coordinates as there are degrees of freedom",
         )
-
-    def assemble(self, assembly: Assembly) -> Array:
-        """Return the pose of an assembly, loops closed."""
-        return assembled_position(self.system, self.signals, 0.0, reference_pose(self.system, assembly))
 
     def task(self, q: Array) -> Array:
         """Return the task coordinates at a pose."""
@@ -383,7 +379,7 @@ class PathClosure(LoopClosure):
         poses = []
         for assembly in self.mechanism.assemblies:
             with suppress(AssemblyError):
-                poses.append(self.assemble(assembly))
+                poses.append(self.assembled(assembly))
         return poses
 
     def _unreachable(

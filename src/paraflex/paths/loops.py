@@ -7,12 +7,12 @@ from functools import cached_property
 import numpy as np
 
 from paraflex.arrays import Array, Indices, Mask
-from paraflex.dynamics import System, build_system, records, still_signals
+from paraflex.dynamics import System, assembled_position, build_system, records, reference_pose, still_signals
 from paraflex.dynamics.system import DENSE_ROWS
 from paraflex.kernel.arrays import apart
 from paraflex.kernel.closure import LOOPS_CLOSED, LOOPS_SINGULAR, close_path, make_closure_scratch
 from paraflex.kernel.packed import MARKER, PackedSystem, Signals
-from paraflex.mechanism import Mechanism, PointRef, with_actuators
+from paraflex.mechanism import Assembly, Mechanism, PointRef, with_actuators
 from .sparse_closure import SparseClosure
 
 # Number of pieces of a step that is too long, divided repeatedly down to the shortest step [s].
@@ -68,6 +68,10 @@ class LoopClosure:
         self.signals: Signals = still_signals(self.system.mechanism, end if end > 0.0 else 1.0)[0]
         self.coordinates = coordinates
         self.packed, self.marker = (self.system.packed, 0) if point is None else with_marker(self.system, point)
+
+    def assembled(self, assembly: Assembly) -> Array:
+        """Return the pose of an assembly, loops closed."""
+        return assembled_position(self.system, self.signals, 0.0, reference_pose(self.system, assembly))
 
     def run(self, times: Array, target: Array, pose: Array) -> tuple[int, int, tuple[Array, Array, Array, Array]]:
         """Close the loops along targets; return status, index, and the computed arrays."""

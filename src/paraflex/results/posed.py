@@ -12,6 +12,7 @@ from paraflex.dynamics.rank import joint_of_row
 from paraflex.errors import InputError, NumericalError
 from paraflex.formatting import number
 from paraflex.mechanism import Mechanism, PointRef, Start
+from paraflex.mechanism.bodies import with_any_masses
 from paraflex.paths import Path, follow_path
 from .acting import first_movements, first_movements_along
 from .drawing import DrawnRun, drawing_data, system_drawing
@@ -106,11 +107,14 @@ def posed(
     """
     if duration is None and path is not None:
         duration = path[1].duration
+    moved = with_any_masses(mechanism)
     if start is not None and path is None:
-        found = _started(mechanism, assembly, start)
+        found = _started(moved, assembly, start)
     else:
-        found = _assembled(mechanism, assembly, path)
-    return replace(found, duration=duration, moves={**first_movements(mechanism, duration), **found.moves})
+        found = _assembled(moved, assembly, path)
+    return replace(
+        found, mechanism=mechanism, duration=duration, moves={**first_movements(mechanism, duration), **found.moves}
+    )
 
 
 def _assembled(mechanism: Mechanism, assembly: str | None, path: tuple[str, Path] | None = None) -> Posed:

@@ -1,0 +1,357 @@
+"""Properties of a driven motion that designers ask for: transmission angles, dead points, time ratios, coupler curves.
+
+Samples only bracket an event; it is located with the exact motion at times between them.
+"""
+
+import math
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass
+from functools import partial
+from itertools import pairwise
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+import scipy
+
+from paraflex.arrays import Array, Mask
+from paraflex.dynamics import axis_angle, joint_coordinate
+from paraflex.dynamics.joint_coordinates import unit_vectors
+from paraflex.dynamics.points import PointMotion, cross, marker_position, point_motion
+from paraflex.mechanism import GROUND, Joint, PointRef
+
+if TYPE_CHECKING:
+    from .motion import DrivenMotion
+
+# Rates below this part of the largest are zero.
+_ZERO = 1e-11
+# Relative error of times that are located.
+_SHARP = 4.0 * np.finfo(float).eps
+# Relative error of times of smooth extremes, whose values are sharp to rounding.
+_LOCATED = 1e-9
+# Speed at a cusp, as a part of the largest speed of the point; smallest angle at which two branches cross [rad].
+_STILL, _CROSSING = 1e-8, 1e-3
+# A curve with more crossings retraces itself.
+_MOST_CROSSINGS = 50
+
+
+class Extreme(NamedTuple):
+    """Extreme of a quantity: its value, and the time [s] and value of the drive's joint [rad, m] there."""
+
+    value: float
+    time: float
+    drive: float | None
+
+
+@dataclass(frozen=True)
+class Transmission:
+    """Transmission angle at a joint, the acute angle between a coupler and the normal to the motion it imparts.
+
+    Attributes
+    ----------
+    joint, coupler : str
+        Joint, and the body or rod with two joints that transmits the force.
+    smallest, largest : Extreme
+        Extremes [rad]: the nearer to a right angle, the better the force is transmitted.
+    """
+
+    joint: str
+    coupler: str
+    smallest: Extreme
+    largest: Extreme
+
+
+@dataclass(frozen=True)
+class Cusp:
+    """Position at which a point comes to rest on its path and reverses: (x, y) [m], time [s], value of the drive."""
+
+    position: tuple[float, float]
+    time: float
+    drive: float | None
+
+
+@dataclass(frozen=True)
+class Crunode:
+    """Position at which the path of a point crosses itself: (x, y) [m], both times [s] and values of the drive."""
+
+    position: tuple[float, float]
+    times: tuple[float, float]
+    drives: tuple[float | None, float | None]
+
+
+@dataclass(frozen=True)
+class Trail:
+    """Path of a point of a body that is not guided by the ground alone.
+
+    Attributes
+    ----------
+    point : str
+        Name of the point.
+    cusps : tuple of Cusp
+        Cusps in order of time.
+    crunodes : tuple of Crunode
+        Crossings; none if the path retraces itself.
+    """
+
+    point: str
+    cusps: tuple[Cusp, ...]
+    crunodes: tuple[Crunode, ...]
+
+
+@dataclass(frozen=True)
+class KinematicFeatures:
+    """Properties of a driven motion.
+
+    Attributes
+    ----------
+    freedoms : int
+        Degrees of freedom without the drives.
+    transmissions : tuple of Transmission
+        Transmission angles where a coupler moves a body that is guided by the ground and not driven.
+    dead_points : mapping of str to tuple of Extreme
+        Positions at which a joint reverses, by joint, in order of time: the value is that of the joint [rad, m].
+    time_ratios : mapping of str to float
+        Ratio of the times of the slower and the faster stroke, for joints with two dead points in a turn of the drive.
+    trails : mapping of str to Trail
+        Paths of coupler points by name.
+    """
+
+    freedoms: int
+    transmissions: tuple[Transmission, ...]
+    dead_points: Mapping[str, tuple[Extreme, ...]]
+    time_ratios: Mapping[str, float]
+    trails: Mapping[str, Trail]
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return plain numbers, in SI units and radians."""
+        extremes = {name: [each._asdict() for each in ends] for name, ends in self.dead_points.items()}
+        angles = [
+            {"joint": one.joint, "coupler": one.coupler, "smallest": one.smallest._asdict(),
+             "largest": one.largest._asdict()} for one in self.transmissions
+        ]  # fmt: skip
+        trails = {
+            name: {"cusps": [asdict(each) for each in one.cusps], "crunodes": [asdict(each) for each in one.crunodes]}
+            for name, one in self.trails.items()
+        }
+        return {"degrees_of_freedom": self.freedoms, "transmission_angles": angles, "dead_points": extremes,
+                "time_ratios": dict(self.time_ratios), "trails": trails}  # fmt: skip
+
+
+def features_of(motion: "DrivenMotion") -> KinematicFeatures:
+    """Compute the properties of a driven motion; see `KinematicFeatures`."""
+    dead = {name: ends for name in _followers(motion) if (ends := tuple(_dead_points(motion, name)))}
+    ratios = {}
+    if motion.drive is not None and motion.drive.full_turn:
+        strokes = {name: abs(ends[1].time - ends[0].time) for name, ends in dead.items() if len(ends) == 2}
+        whole = motion.drive.duration
+        ratios = {name: max(t, whole - t) / min(t, whole - t) for name, t in strokes.items()}
+    trails = {str(ref): _trail(motion, ref) for ref in _coupler_points(motion)}
+    return KinematicFeatures(motion.mobility.freedoms, tuple(_transmissions(motion)), dead, ratios, trails)
+
+
+def _driven(motion: "DrivenMotion") -> set[str]:
+    return {one.joint for one in motion.system.mechanism.prescribed}
+
+
+def _followers(motion: "DrivenMotion") -> list[str]:
+    """Return the joints that move and are not driven."""
+    return [one.name for one in motion.system.mechanism.joints if one.moves and one.name not in _driven(motion)]
+
+
+def _at(motion: "DrivenMotion", value: float, t: float) -> Extreme:
+    return Extreme(value, t, None if motion.drive is None else motion.drive.at(t))
+
+
+def _root(function: Callable[[float], float], a: float, b: float) -> float:
+    return float(scipy.optimize.brentq(function, a, b, xtol=_SHARP * max(abs(a), abs(b)), rtol=_SHARP))
+
+
+def _sign_changes(
+    t: Array, values: Array, zero: float, rate: Callable[[float], float], *, repeats: bool
+) -> Iterator[float]:
+    """Yield the times at which a quantity changes its sign; at the end of a motion that repeats, if it does there."""
+    signs = np.where(np.abs(values) <= zero, 0.0, np.sign(values))
+    clear = np.flatnonzero(signs)
+    for i, j in pairwise(clear):
+        if signs[i] != signs[j]:
+            yield float(t[(i + j) // 2]) if j - i > 1 else _root(rate, t[i], t[j])
+    if repeats and clear.size and (clear[0] > 0 or clear[-1] < t.size - 1) and signs[clear[0]] != signs[clear[-1]]:
+        yield float(t[0])
+
+
+def _repeats(motion: "DrivenMotion") -> bool:
+    return motion.drive is not None and motion.drive.full_turn
+
+
+def _dead_points(motion: "DrivenMotion", name: str) -> Iterator[Extreme]:
+    """Yield the positions at which a joint reverses."""
+    solution, system = motion.solution, motion.system
+    rates = joint_coordinate(system, name, solution.q, solution.v).rate
+    largest = float(np.max(np.abs(rates)))
+    if not largest > _ZERO * (1.0 if motion.drive is None else motion.drive.speed):
+        return
+
+    def rate(t: float) -> float:
+        there = motion.at(t)
+        return float(joint_coordinate(system, name, there.q, there.v).rate[0])
+
+    for t in sorted(_sign_changes(solution.t, rates, _ZERO * largest, rate, repeats=_repeats(motion))):
+        yield _at(motion, float(joint_coordinate(system, name, motion.at(t).q).value[0]), t)
+
+
+def _guides(motion: "DrivenMotion") -> dict[str, Joint]:
+    """Return the joint that guides each body on the ground: a pivot or an axis; bodies with others are left out."""
+    found: dict[str, list[Joint]] = {}
+    for joint in motion.system.mechanism.joints:
+        if joint.a.on_ground or joint.b.on_ground:
+            found.setdefault(joint.b.body if joint.a.on_ground else joint.a.body, []).append(joint)
+    return {body: joints[0] for body, joints in found.items() if len(joints) == 1 and joints[0].moves}
+
+
+def _ends(joint: Joint, body: str) -> tuple[PointRef, PointRef]:
+    """Return the points of a joint on a body and on the other body."""
+    return (joint.a, joint.b) if joint.a.body == body else (joint.b, joint.a)
+
+
+def _couplers(motion: "DrivenMotion") -> Iterator[tuple[str, str, PointRef, PointRef]]:
+    """Yield the links with two pins: name, joint at the far end, that point of the other body, the near point."""
+    mechanism = motion.system.mechanism
+    for body in mechanism.bodies:
+        joints = [one for one in mechanism.joints if body.name in (one.a.body, one.b.body)]
+        if len(joints) == 2 and all(one.holds == ("points",) for one in joints):
+            for near, far in (joints, joints[::-1]):
+                yield body.name, far.name, _ends(far, body.name)[1], _ends(near, body.name)[0]
+    for one in mechanism.joints:
+        if one.holds == ("distance",):
+            yield one.name, one.name, one.b, one.a
+            yield one.name, one.name, one.a, one.b
+
+
+def _transmissions(motion: "DrivenMotion") -> Iterator[Transmission]:
+    """Yield the transmission angles of couplers at bodies that are guided by the ground and not driven."""
+    guides, driven, t = _guides(motion), _driven(motion), motion.solution.t
+    for coupler, joint, far, near in _couplers(motion):
+        guide = guides.get(far.body)
+        if far.on_ground or guide is None or guide.name in driven or near.body == GROUND:
+            continue
+        pressure = partial(_pressure_angle, motion, far, near, guide)
+        values = pressure(motion.solution.q)
+
+        def at(time: float, pressure: Callable[[Array], Array] = pressure) -> float:
+            return float(pressure(motion.at(time).q)[0])
+
+        worst = _peak(t, np.abs(values), lambda time, at=at: abs(at(time)))
+        best = next(_sign_changes(t, values, 0.0, at, repeats=False), None)
+        if best is None:
+            best = _peak(t, -np.abs(values), lambda time, at=at: -abs(at(time)))
+        ends = [_at(motion, 0.5 * math.pi - abs(at(time)), time) for time in (worst, best)]
+        yield Transmission(joint, coupler, *ends)
+
+
+def _pressure_angle(motion: "DrivenMotion", far: PointRef, near: PointRef, guide: Joint, q: Array) -> Array:
+    """Return the angle (k,) between the line of a coupler and the motion that it imparts, in [-pi/2, pi/2]."""
+    system = motion.system
+    along = _places(motion, far, q) - _places(motion, near, q)
+    if guide.slides:
+        normal = unit_vectors(axis_angle(system, guide, q) + 0.5 * math.pi)
+    else:
+        normal = _places(motion, far, q) - _places(motion, _ends(guide, far.body)[1], q)
+    # The angle between along and normal is the transmission angle: its deviation from a right angle is wanted.
+    return np.arcsin(np.clip(_cosine(along, normal), -1.0, 1.0))
+
+
+def _cosine(a: Array, b: Array) -> Array:
+    return np.sum(a * b, axis=1) / (np.linalg.norm(a, axis=1) * np.linalg.norm(b, axis=1))
+
+
+def _places(motion: "DrivenMotion", ref: PointRef, q: Array) -> Array:
+    return marker_position(motion.system, motion.system.marker(ref), q)
+
+
+def _peak(t: Array, values: Array, function: Callable[[float], float]) -> float:
+    """Return the time of the largest value of a smooth function near its largest sample."""
+    k = int(np.argmax(values))
+    span = t[max(k - 1, 0)], t[min(k + 1, t.size - 1)]
+    found = scipy.optimize.minimize_scalar(
+        lambda time: -function(time), bounds=span, method="bounded", options={"xatol": _LOCATED * t[-1]}
+    )
+    return float(found.x) if -found.fun > values[k] else float(t[k])
+
+
+def _coupler_points(motion: "DrivenMotion") -> list[PointRef]:
+    """Return the named points of bodies that are not guided by the ground alone, one at each joint."""
+    mechanism, guides = motion.system.mechanism, _guides(motion)
+    taken = {one.b for one in mechanism.joints} | {one.a for one in mechanism.joints if one.b.on_ground}
+    guided = {ref for one in mechanism.joints if one.holds[0] == "points" for ref in (one.a, one.b)
+              if one.a.body in guides or one.b.body in guides}  # fmt: skip
+    refs = [PointRef(body.name, point) for body in mechanism.bodies for point in body.points]
+    return [ref for ref in refs if ref.body not in guides and ref not in taken | guided]
+
+
+def _trail(motion: "DrivenMotion", ref: PointRef) -> Trail:
+    """Return cusps and crossings of the path of a point."""
+    system, solution = motion.system, motion.solution
+
+    def there(t: float) -> PointMotion:
+        return point_motion(system, ref, *motion.at(t))
+
+    path = point_motion(system, ref, solution.q, solution.v, solution.a)
+    speeds = np.linalg.norm(path.velocity, axis=1)
+    fastest = float(np.max(speeds))
+    if not fastest > 0.0:
+        return Trail(str(ref), (), ())
+
+    def gain(t: float) -> float:
+        here = there(t)
+        return float(np.sum(here.velocity * here.acceleration))
+
+    gains = np.sum(path.velocity * path.acceleration, axis=1)
+    slowest = _sign_changes(solution.t, gains, _ZERO * float(np.max(np.abs(gains))), gain, repeats=_repeats(motion))
+    cusps = []
+    for t in sorted(slowest):
+        here = there(t)
+        if np.linalg.norm(here.velocity) < _STILL * fastest:
+            cusps.append(Cusp(_pair(here.position[0]), t, _at(motion, 0.0, t).drive))
+    crunodes = []
+    for t in _crossings(motion, path.position, there):
+        where = _pair(there(t[0]).position[0])
+        crunodes.append(Crunode(where, t, (_at(motion, 0.0, t[0]).drive, _at(motion, 0.0, t[1]).drive)))
+    return Trail(str(ref), tuple(cusps), tuple(crunodes))
+
+
+def _pair(xy: Array) -> tuple[float, float]:
+    return float(xy[0]), float(xy[1])
+
+
+def _crossings(
+    motion: "DrivenMotion", path: Array, there: Callable[[float], PointMotion]
+) -> Sequence[tuple[float, float]]:
+    """Return the pairs of times at which a path (k, 2) crosses itself; none if it retraces itself."""
+    t, found = motion.solution.t, []
+    pairs = np.argwhere(_crossed(path))
+    if len(pairs) > _MOST_CROSSINGS:
+        return []
+    for i, j in pairs:
+        times = np.array([t[i] + t[i + 1], t[j] + t[j + 1]]) / 2.0
+        for _ in range(20):
+            one, two = there(times[0]), there(times[1])
+            rates = np.column_stack([one.velocity[0], -two.velocity[0]])
+            sizes = np.linalg.norm(rates, axis=0)
+            if not abs(np.linalg.det(rates)) > _CROSSING * sizes[0] * sizes[1]:
+                break
+            move = np.linalg.solve(rates, (two.position - one.position)[0])
+            times = np.clip(times + move, t[0], t[-1])
+            if np.max(np.abs(move)) < 1e-13 * t[-1]:
+                found.append((float(times[0]), float(times[1])))
+                break
+    return found
+
+
+def _crossed(path: Array) -> Mask:
+    """Return which pairs (k - 1, k - 1) of segments of a polyline cross, the earlier one first, neighbours excluded."""
+    a, b = path[:-1], path[1:]
+    side = cross((b - a)[:, None], path[None] - a[:, None])
+    apart = side[:, :-1] * side[:, 1:] < 0.0
+    crossed = np.triu(apart & apart.T, 2)
+    if np.allclose(path[0], path[-1], rtol=0.0, atol=1e-9 * float(np.max(np.ptp(path, axis=0)))):
+        crossed[0, -1] = False
+    return crossed

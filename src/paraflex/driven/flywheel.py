@@ -1,0 +1,88 @@
+"""Flywheel that keeps the speed of a drive within a given fluctuation, from the torque over a turn."""
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+import scipy
+
+from paraflex.arguments import checked_arguments
+from paraflex.dynamics.joint_loads import drive_torques
+from paraflex.errors import InputError
+from .motion import DrivenMotion
+
+
+@dataclass(frozen=True)
+class Flywheel:
+    """Flywheel on the axis of a drive.
+
+    Attributes
+    ----------
+    inertia : float
+        Moment of inertia [kg m^2] for the fluctuation, without that of the drive's own body.
+    fluctuation : float
+        Coefficient of fluctuation: range of the speed over its mean.
+    energy : float
+        Largest difference of the energy exchanged within a turn [J].
+    mean_torque : float
+        Mean torque of the drive [N m].
+    error : float
+        Difference of the inertia from that of half as many samples [kg m^2].
+    """
+
+    inertia: float
+    fluctuation: float
+    energy: float
+    mean_torque: float
+    error: float
+
+
+@checked_arguments()
+def flywheel(motion: DrivenMotion, fluctuation: float) -> Flywheel:
+    """Compute the flywheel of a drive that makes a whole turn.
+
+    The energy is the range of the integral of torque less mean torque over the angle, E; the inertia is
+    E / (fluctuation speed^2).
+
+    Parameters
+    ----------
+    motion : DrivenMotion
+        Motion with loads, made by `torques`, over a whole turn.
+    fluctuation : float
+        Coefficient of fluctuation, such as 0.02.
+
+    Raises
+    ------
+    InputError
+        The fluctuation is not positive, the drive makes no whole turn, or the motion has no loads.
+    """
+    if not (math.isfinite(fluctuation) and fluctuation > 0.0):
+        raise InputError("not positive", field="fluctuation", value=fluctuation, remedy="give a ratio such as 0.02")
+    drive = motion.drive
+    if drive is None or not drive.full_turn:
+        raise InputError(
+            "a flywheel needs a drive that makes a whole turn", field="fluctuation", value=fluctuation,
+            remedy="leave it out, or drive a joint that turns without limits",
+        )  # fmt: skip
+    torque = drive_torques(motion.system, motion.solution.multipliers)[:, 0]
+    if np.isnan(torque).any():
+        raise InputError("the motion has no loads", field="motion", remedy="compute it by torques, with masses")
+    angle = np.linspace(drive.start, drive.end, torque.size)
+    energy, mean = _energy(angle, torque)
+    inertia = energy / (fluctuation * drive.speed**2)
+    coarse = _energy(angle[::2], torque[::2])[0] / (fluctuation * drive.speed**2) if torque.size % 2 else math.nan
+    return Flywheel(inertia, fluctuation, energy, mean, abs(inertia - coarse))
+
+
+def _energy(angle: np.ndarray, torque: np.ndarray) -> tuple[float, float]:
+    """Return the range of the energy within a turn [J] and the mean torque [N m], from a periodic cubic spline."""
+    closed = torque.copy()
+    closed[-1] = closed[0]
+    spline = scipy.interpolate.CubicSpline(angle, closed, bc_type="periodic") if angle[-1] > angle[0] else (
+        scipy.interpolate.CubicSpline(angle[::-1], closed[::-1], bc_type="periodic"))  # fmt: skip
+    low, high = sorted((float(angle[0]), float(angle[-1])))
+    mean = float(spline.integrate(low, high)) / (high - low)
+    stored = spline.antiderivative()
+    places = np.concatenate([[low], spline.solve(mean, extrapolate=False), [high]])
+    values = stored(places) - mean * places
+    return float(np.ptp(values)), mean

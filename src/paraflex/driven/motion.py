@@ -1,0 +1,449 @@
+"""Positions, velocities and accelerations of a rigid mechanism over the travel of its drive, and its rigid torques."""
+
+import math
+import time
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import ClassVar, NamedTuple
+
+import numpy as np
+
+from paraflex.arguments import checked_arguments, named_in_errors
+from paraflex.arrays import Array
+from paraflex.dynamics import System, assembled_position, build_system, dependence, still_signals
+from paraflex.dynamics.joint_coordinates import joint_value, value_text
+from paraflex.dynamics.soundness import Mobility, mobility
+from paraflex.dynamics.state import State
+from paraflex.dynamics.stiffness import RestingForces
+from paraflex.errors import InputError, Moment, UnreachablePathError
+from paraflex.findings import Finding
+from paraflex.formatting import quantity
+from paraflex.integrators import Solution
+from paraflex.kernel.bodies import stored_energy
+from paraflex.kernel.constraints import constraint_values
+from paraflex.kernel.packed import make_scratch
+from paraflex.limits import solvable
+from paraflex.mechanism import ConstantSpeed, Mechanism, PrescribedAngle, standing
+from paraflex.mechanism.bodies import with_any_masses
+from paraflex.mechanism.quantities import known
+from paraflex.motion import MotionRun
+from paraflex.paths import ModelWithPaths
+from paraflex.paths.loops import LoopClosure
+from .assemblies import FoundAssembly, assemblies_of
+from .features import KinematicFeatures, features_of
+from .limits import limit_of_reach
+
+# Fraction of the range between two limits of reach that is left out at either limit, where rates grow without bound.
+_MARGIN = 1e-3
+# Largest travel of a sliding drive whose range is not given, in sizes of the mechanism.
+_LONGEST_TRAVEL = 4.0
+_NO_TASKS = np.zeros(0, dtype=np.int64)
+_GIVE_RANGE = "give the start and end of its travel"
+
+
+class Motions(NamedTuple):
+    """Coordinates, velocities and accelerations (k, n) at some times."""
+
+    q: Array
+    v: Array
+    a: Array
+
+
+@dataclass(frozen=True)
+class Drive:
+    """Joint that moves the mechanism, at constant speed.
+
+    Attributes
+    ----------
+    name, joint : str
+        Name of the prescribed motion, and of its joint.
+    start, end : float
+        First and last angle [rad] or travel [m] of the joint.
+    speed : float
+        Speed, positive [rad/s, m/s].
+    unit : str
+        Unit of its coordinate: "rad" or "m".
+    reach : tuple of float or None
+        Lowest and highest angle or travel that the mechanism allows in this assembly, None for those that do not lie
+        in the range examined.
+    """
+
+    name: str
+    joint: str
+    start: float
+    end: float
+    speed: float
+    unit: str
+    reach: tuple[float | None, float | None] = (None, None)
+
+    @property
+    def full_turn(self) -> bool:
+        """Whether the joint makes a whole turn, after which the motion repeats."""
+        return self.unit == "rad" and math.isclose(abs(self.end - self.start), 2.0 * math.pi, rel_tol=1e-9)
+
+    @property
+    def duration(self) -> float:
+        """Time of the travel [s]."""
+        return abs(self.end - self.start) / self.speed
+
+    @property
+    def profile(self) -> ConstantSpeed:
+        """Angle or travel over time."""
+        return ConstantSpeed(self.start, math.copysign(self.speed, self.end - self.start))
+
+    def at(self, t: float) -> float:
+        """Return the angle or travel at a time [s]."""
+        return self.start + t * self.profile.speed
+
+
+@named_in_errors("a driven motion", "the motion that kinematics returns")
+@dataclass(frozen=True)
+class DrivenMotion(MotionRun):
+    """Motion of a rigid mechanism that its drives determine.
+
+    It is a run whose solution comes from the closure of the loops instead of integration: every sample is exact to
+    rounding. Datasets, reports, figures and films are made of it as of other runs.
+
+    Attributes
+    ----------
+    drive : Drive, optional
+        Joint that moves at constant speed; None if the mechanism's own prescribed motions act.
+    loops : LoopClosure
+        Equations that determine the motion.
+    """
+
+    drive: Drive | None
+    loops: LoopClosure
+    open_loop: ClassVar[bool] = False
+
+    @cached_property
+    def findings(self) -> tuple[Finding, ...]:
+        """Findings of the motion; none, as it is exact to rounding."""
+        return ()
+
+    @cached_property
+    def features(self) -> KinematicFeatures:
+        """Transmission angles, dead points, time ratios and coupler curves."""
+        return features_of(self)
+
+    @cached_property
+    def mobility(self) -> Mobility:
+        """Degrees of freedom without the drives, and redundant constraints, at the first sample."""
+        mechanism = replace(self.loops.system.mechanism, prescribed=())
+        return mobility(build_system(mechanism), State(0.0, self.solution.q[0], self.solution.v[0]))
+
+    def assemblies(self, starts: int = 200) -> list[FoundAssembly]:
+        """Return all assemblies found with the drives as at the first sample; see `assemblies_of`."""
+        return assemblies_of(self, starts)
+
+    def at(self, t: float) -> Motions:
+        """Return the motion (1, n) at a time within the samples [s], exact to rounding."""
+        k = int(np.clip(np.searchsorted(self.solution.t, t) - 1, 0, self.solution.t.size - 1))
+        times = np.array([self.solution.t[k], t])
+        found = self.loops.follow(_no_target, times, np.array([False, True]), self.solution.q[k].copy())
+        return Motions(*found.arrays[1:4])
+
+
+def _no_target(times: Array) -> Array:
+    return np.zeros((times.size, 3, 0))
+
+
+@checked_arguments()
+@solvable("kinematics")
+def kinematics(
+    mechanism: Mechanism | ModelWithPaths,
+    drive: str | None = None,
+    *,
+    start: float | None = None,
+    end: float | None = None,
+    speed: float | None = None,
+    duration: float | None = None,
+    samples: int = 361,
+    assembly: str | None = None,
+) -> DrivenMotion:
+    """Compute positions, velocities and accelerations of a mechanism over the travel of a joint that drives it.
+
+    All bodies are rigid. Masses have no effect and are not needed.
+
+    Parameters
+    ----------
+    mechanism : Mechanism or Model
+        Mechanism, or a model with one.
+    drive : str, optional
+        Joint that moves at constant speed. By default the mechanism's prescribed motions act, or, if there are none,
+        the joint of its only motor.
+    start, end : float, optional
+        First and last angle [rad] or travel [m] of the drive. By default a whole turn from the assembly or from
+        `start`; if the joint cannot make one, the range between its limits of reach.
+    speed : float, optional
+        Speed of the drive [rad/s, m/s]; by default that of the prescribed motion at its joint, else 1.
+    duration : float, optional
+        Duration of prescribed motions that are not of constant speed [s]; that of the model's study by default.
+    samples : int
+        Number of samples, evenly spaced, both ends included.
+    assembly : str, optional
+        Assembly in which the mechanism moves; the first by default.
+
+    Returns
+    -------
+    DrivenMotion
+        Motion at the samples. Forces and energies are NaN: see `torques`.
+
+    Raises
+    ------
+    InputError
+        An unknown joint or one that does not move, a range out of order, or drives that do not determine the motion.
+    AssemblyError
+        The loops do not close.
+    UnreachablePathError
+        The drive cannot cover the range, because of a limit of reach or a change point; the error names its angle or
+        travel and carries the motion until there, or None.
+    """
+    light = with_any_masses(Mechanism.from_source(mechanism))
+    if duration is None:
+        duration = _study_duration(mechanism)
+    return _driven(light, drive, start, end, speed, duration, samples, assembly)
+
+
+@checked_arguments()
+@solvable("rigid torques")
+def torques(
+    mechanism: Mechanism | ModelWithPaths,
+    drive: str | None = None,
+    *,
+    start: float | None = None,
+    end: float | None = None,
+    speed: float | None = None,
+    duration: float | None = None,
+    samples: int = 361,
+    assembly: str | None = None,
+) -> DrivenMotion:
+    """Compute the motion as `kinematics` does, with the torque of the drive, joint forces and shaking forces.
+
+    The inverse dynamics of the rigid mechanism includes weight, loads, springs, dampers and friction.
+
+    Parameters
+    ----------
+    mechanism, drive, start, end, speed, duration, samples, assembly
+        See `kinematics`.
+
+    Returns
+    -------
+    DrivenMotion
+        Motion with multipliers and energies; the work is NaN.
+
+    Raises
+    ------
+    InputError, AssemblyError, UnreachablePathError
+        See `kinematics`; also InputError for a body without mass.
+    """
+    if duration is None:
+        duration = _study_duration(mechanism)
+    motion = _driven(Mechanism.from_source(mechanism), drive, start, end, speed, duration, samples, assembly)
+    return replace(motion, solution=with_loads(motion.system, motion.solution))
+
+
+def _study_duration(given: Mechanism | ModelWithPaths) -> float | None:
+    return getattr(getattr(given, "study", None), "duration", None)
+
+
+def _driven(
+    mechanism: Mechanism,
+    drive: str | None,
+    start: float | None,
+    end: float | None,
+    speed: float | None,
+    duration: float | None,
+    samples: int,
+    assembly: str | None,
+) -> DrivenMotion:
+    began = time.perf_counter()
+    if samples < 2:
+        raise InputError("too few", field="samples", value=samples, remedy="give at least 2")
+    moved = standing(mechanism.rigid(), assembly)
+    begun = LoopClosure(moved, 0.0, None, _NO_TASKS)
+    pose = begun.assembled(moved.assembly(assembly))
+    law = _chosen(moved, drive, start, end, speed, begun.system, pose)
+    if law is None:
+        if duration is None or not duration > 0.0:
+            raise InputError(
+                "is missing" if duration is None else "not positive", field="duration", value=duration,
+                remedy="give it in seconds, or name a drive",
+            )  # fmt: skip
+        loops, pose = _loops(moved, pose, duration)
+        arrays = _followed(loops, np.linspace(0.0, duration, samples), pose)
+    else:
+        loops, pose, law = _ranged(moved, law, pose, fixed=end is not None)
+        moved = loops.mechanism
+        arrays = _followed(loops, np.linspace(0.0, law.duration, samples), pose, law)
+    system = build_system(moved)
+    return DrivenMotion(system, arrays[0], {motor.name: 0.0 for motor in moved.motors},
+                        _solution(system, arrays, began), law, loops)  # fmt: skip
+
+
+def _chosen(
+    mechanism: Mechanism, joint: str | None, start: float | None, end: float | None, speed: float | None,
+    system: System, pose: Array,
+) -> Drive | None:  # fmt: skip
+    """Return the drive of constant speed; None if the mechanism's own prescribed motions act as they are."""
+    prescribed = mechanism.prescribed
+    steady = [one for one in prescribed if isinstance(one.profile, ConstantSpeed)]
+    given = next((name for name, value in (("start", start), ("end", end), ("speed", speed)) if value is not None), "")
+    if joint is None and (len(steady) != 1 or len(prescribed) != 1):
+        motors = [motor.joint for motor in mechanism.motors]
+        if prescribed and not given:
+            return None
+        if prescribed or len(motors) != 1:
+            joints = ", ".join(one.name for one in mechanism.joints if one.moves)
+            raise InputError("is missing", field="drive", remedy=f"name the joint that drives the mechanism: {joints}")
+        joint = motors[0]
+    elif joint is None:
+        joint = steady[0].joint
+    known(joint, [one.name for one in mechanism.joints], "drive", "joint")
+    one = mechanism.joint(joint)
+    one.check_moves("drive")
+    before = next((each for each in prescribed if each.joint == joint), None)
+    profile = None if before is None else before.profile
+    steadily = profile if isinstance(profile, ConstantSpeed) else None
+    unit = "m" if one.slides else "rad"
+    if speed is None:
+        speed = abs(steadily.speed) if steadily is not None and steadily.speed else 1.0
+    if not (math.isfinite(speed) and speed > 0.0):
+        raise InputError(
+            "not positive", field="speed", value=speed, remedy=f"give it in {unit}/s; start and end give the direction"
+        )
+    backwards = steadily is not None and steadily.speed < 0.0
+    if start is None:
+        start = joint_value(system, joint, pose)
+    turn = 2.0 * math.pi if unit == "rad" else _LONGEST_TRAVEL * system.size
+    if end is not None and end == start:
+        raise InputError("the drive does not move", field="end", value=end, remedy="give another value than the start")
+    last = start + (-turn if backwards else turn) if end is None else end
+    motor = next((each.name for each in mechanism.motors if each.joint == joint), joint)
+    return Drive(before.name if before else motor, joint, start, last, speed, unit)
+
+
+def _loops(mechanism: Mechanism, pose: Array, end: float) -> tuple[LoopClosure, Array]:
+    """Return the closure of a mechanism moved by its prescribed motions, and the pose at their start."""
+    loops = LoopClosure(mechanism, end, None, _NO_TASKS)
+    system = loops.system
+    pose = assembled_position(system, loops.signals, 0.0, pose)
+    free = system.n - system.m
+    if free > 0:
+        one, several = "1 degree of freedom", f"{free} degrees of freedom"
+        raise InputError(
+            f"the drives leave {one if free == 1 else several} of the mechanism open", field="drive",
+            value=", ".join(each.joint for each in mechanism.prescribed) or None,
+            remedy="kinematics needs as many drives as degrees of freedom: add [prescribed] motions",
+        )  # fmt: skip
+    if free < 0:
+        found = dependence(system, pose)
+        names = ", ".join(dict.fromkeys(system.rows[row] for row in found.dropped))
+        raise InputError(
+            f"more constraints and drives than degrees of freedom; redundant: {names}", field="joint",
+            remedy="leave out the joint or drive whose constraints follow from the others",
+        )  # fmt: skip
+    return loops, pose
+
+
+def _with_drive(mechanism: Mechanism, law: Drive) -> Mechanism:
+    return replace(mechanism, prescribed=(PrescribedAngle(law.name, law.joint, law.profile),))
+
+
+def _ranged(mechanism: Mechanism, law: Drive, pose: Array, *, fixed: bool) -> tuple[LoopClosure, Array, Drive]:
+    """Return closure, first pose and drive; without a given end the range is a turn or lies between two limits."""
+    loops, pose = _loops(_with_drive(mechanism, law), pose, law.duration)
+    if fixed or (stopped := _reached(loops, law, pose)) is None:
+        if not fixed and law.unit == "m":
+            raise InputError(
+                "a joint that slides without a limit of reach", field="drive", value=law.joint, remedy=_GIVE_RANGE
+            )
+        return loops, pose, law
+    ends = []
+    for way in (law, replace(law, end=2.0 * law.start - law.end)):
+        there = LoopClosure(_with_drive(mechanism, way), way.duration, None, _NO_TASKS)
+        stopped = _reached(there, way, pose)
+        limit = None if stopped is None else limit_of_reach(there.system, stopped)
+        if limit is None:
+            raise _barred(way, there, stopped, None)
+        ends.append(limit)
+    low, high = sorted(ends)
+    reach, inside = (low, high), _MARGIN * (high - low)
+    span = (low + inside, high - inside) if law.end > law.start else (high - inside, low + inside)
+    back = replace(law, end=span[0])
+    there = LoopClosure(_with_drive(mechanism, back), max(back.duration, 1e-6), None, _NO_TASKS)
+    if span[0] != law.start:
+        pose = _followed(there, np.array([0.0, back.duration]), pose, back)[1][-1]
+    law = replace(law, start=span[0], end=span[1], reach=reach)
+    return LoopClosure(_with_drive(mechanism, law), law.duration, None, _NO_TASKS), pose, law
+
+
+def _grid(duration: float) -> Array:
+    return np.linspace(0.0, duration, 181)
+
+
+def _reached(loops: LoopClosure, law: Drive, pose: Array) -> Array | None:
+    """Return the last pose with closed loops before the end of a drive's travel; None if it covers all of it."""
+    times = _grid(law.duration)
+    found = loops.follow(_no_target, times, np.ones(times.size, dtype=bool), pose.copy())
+    return None if found.closed else found.last
+
+
+def _followed(loops: LoopClosure, times: Array, pose: Array, law: Drive | None = None) -> tuple[Array, ...]:
+    """Return times, coordinates, velocities and accelerations along the whole motion."""
+    found = loops.follow(_no_target, times, np.ones(times.size, dtype=bool), pose.copy())
+    if not found.closed:
+        raise _barred(law, loops, found.last, found.stopped)
+    return found.arrays[:4]
+
+
+def _barred(law: Drive | None, loops: LoopClosure, last: Array | None, stopped: float | None) -> UnreachablePathError:
+    """Return the error of a motion that stops at a limit of reach or a change point."""
+    system = loops.system
+    q = last if last is not None else np.zeros(system.n)
+    drives = ", ".join(f"{one.joint} at {value_text(system, one.joint, q)}" for one in system.mechanism.prescribed)
+    limit = limit_of_reach(system, q) if law is not None and last is not None else None
+    if limit is not None and law is not None:
+        cause = f"{law.joint} reaches its limit of reach, {quantity(limit, law.unit, digits=6)},"
+    else:
+        cause = f"the motion passes a change point or a limit of reach near {drives},"
+    at = stopped if stopped is not None else 0.0
+    return UnreachablePathError(
+        cause, Moment(at, 0), None, "give a range on one side of it, or drive another joint"
+    )  # fmt: skip
+
+
+def _solution(system: System, arrays: tuple[Array, ...], began: float) -> Solution:
+    """Return the solution of exact positions, velocities and accelerations, without forces and energies."""
+    t, q, v, a = arrays
+    none = np.full(t.size, np.nan)
+    signals = still_signals(system.mechanism, float(t[-1]))[0]
+    scratch, gaps = make_scratch(system.packed), np.zeros((2, t.size, system.m))
+    for k, at in enumerate(t.tolist()):
+        constraint_values(system.packed, signals, at, q[k], v[k], scratch, gaps[0, k], gaps[1, k])
+    return Solution(
+        t=t, q=q, v=v, a=a, multipliers=np.full((t.size, system.m), np.nan), kinetic_energy=none, strain_energy=none,
+        work=none, status="complete", message="", steps=t.size, energy_balance_max=math.nan, method="closure of loops",
+        constraint_position_max=float(np.max(np.abs(gaps[0]))), constraint_velocity_max=float(np.max(np.abs(gaps[1]))),
+        wall_time=time.perf_counter() - began,
+    )  # fmt: skip
+
+
+def with_loads(system: System, solution: Solution) -> Solution:
+    """Return a solution with the multipliers that its motion requires, and energies.
+
+    Phi_q^T lambda = -(M a + h - loads), with the multipliers of springs, dampers and friction from their laws.
+    """
+    forces, held = RestingForces(system, 0.0, beams=True), system.constrained
+    forces.signals = still_signals(system.mechanism, float(solution.t[-1]))[0]
+    scratch = make_scratch(system.packed)
+    multipliers, energies = np.zeros(solution.multipliers.shape), np.zeros((solution.t.size, 2))
+    for k, (t, q, v, a) in enumerate(zip(solution.t, solution.q, solution.v, solution.a, strict=True)):
+        forces.time, forces.v, forces.a = float(t), v, a
+        lam = forces.compliant(q)
+        rows = system.dimensionless_jacobian(q)[held]
+        left = forces(q, lam)[0] * system.units
+        lam[held] = -np.linalg.solve(rows.T, left) / system.row_units[held]
+        multipliers[k] = lam
+        energies[k] = stored_energy(system.packed, q, v, lam, scratch)[:2]
+    return replace(solution, multipliers=multipliers, kinetic_energy=energies[:, 0], strain_energy=energies[:, 1])

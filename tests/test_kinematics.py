@@ -1,0 +1,346 @@
+"""Kinematics and rigid torques against the PMKS reference set, textbook formulas, closed forms and integration."""
+
+import json
+import math
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import paraflex as pf
+from paraflex.errors import InputError, UnreachablePathError
+
+REFERENCE = {one["name"]: one for one in json.loads((Path(__file__).parent / "pmks.json").read_text())["mechanisms"]}
+# Relative to the largest number of a kind; the reference is right to about 1e-13.
+EXACT = 1e-9
+
+
+def built(case, gravity=(0.0, 0.0)):
+    """Return the mechanism of a reference case; a link's x axis goes from its first joint to its second."""
+    at = {one["id"]: np.array(one["initial"], dtype=float) for one in case["joints"] + case["points"]}
+    on = {}
+    for one in case["joints"]:
+        for link in one["links"]:
+            on.setdefault(link, []).append(one["id"])
+    for one in case["points"]:
+        on[one["link"]].append(one["id"])
+    masses, load = case.get("masses", {}), case.get("load")
+    ground = {name: tuple(at[name]) for name in on.pop("ground")}
+    bodies, angles = [], {}
+    for link, names in on.items():
+        origin, (x, y) = at[names[0]], at[names[1]] - at[names[0]]
+        angles[link] = math.atan2(y, x)
+        c, s = math.cos(angles[link]), math.sin(angles[link])
+
+        def local(place, origin=origin, c=c, s=s):
+            dx, dy = np.asarray(place) - origin
+            return float(c * dx + s * dy), float(c * dy - s * dx)
+
+        points = {name: local(at[name]) for name in names}
+        given = {}
+        if link in masses:
+            points["com"] = local(masses[link]["com_initial"])
+            given = {"mass": masses[link]["mass"], "inertia": masses[link]["inertia"], "centre_of_mass": points["com"]}
+        bodies.append(pf.RigidBody(link, points=points, **given))
+    joints = []
+    for one in case["joints"]:
+        a, b = (pf.PointRef(link, one["id"]) for link in sorted(one["links"], key=lambda link: link != "ground"))
+        if "guide_axis" in one:
+            x, y = one["guide_axis"]
+            joints.append(pf.SlotJoint(one["id"], a, b, direction=math.atan2(y, x)))
+        else:
+            joints.append(pf.RevoluteJoint(one["id"], a, b))
+    loads = () if load is None else (pf.PointForce("load", pf.PointRef(load["link"], "com"), tuple(load["force"])),)
+    return pf.Mechanism(
+        name=case["name"], ground=ground, bodies=tuple(bodies), joints=tuple(joints), loads=loads, gravity=gravity,
+        assemblies=(pf.Assembly("start", angles),),
+    )  # fmt: skip
+
+
+def reference_motion(function, case, instant, gravity=(0.0, 0.0)):
+    """Return the motion of the input by the angle of an instant; the last sample is the instant."""
+    turned, speed = math.radians(instant["angle"]), instant["omega"]
+    mechanism = built(case, gravity)
+    crank = next(one["id"] for one in case["joints"] if set(one["links"]) == {"ground", case["input"]})
+    start = mechanism.assembly("start").angles[case["input"]]
+    # An instant at the start is the first sample of a stroke.
+    end = start + (turned if turned else math.copysign(0.05, speed))
+    motion = function(mechanism, crank, start=start, end=end, speed=abs(speed))
+    # Accelerations, reactions and torques do not depend on the direction in which the stroke is traversed.
+    return motion, (-1 if turned else 0), math.copysign(1.0, speed) * math.copysign(1.0, end - start), crank
+
+
+def close(found, right, scale=None):
+    right = np.asarray(right, dtype=float)
+    return np.max(np.abs(np.asarray(found) - right)) <= EXACT * (scale or max(1.0, float(np.max(np.abs(right)))))
+
+
+INSTANTS = [(name, k) for name, case in REFERENCE.items() for k in range(len(case["instants"]))]
+
+
+@pytest.mark.parametrize(("name", "k"), INSTANTS)
+def test_motions_are_those_of_the_reference_set(name, k):
+    case = REFERENCE[name]
+    instant = case["instants"][k]
+    motion, at, sign, _ = reference_motion(pf.kinematics, case, instant)
+    data = pf.motion_dataset(motion).isel(time=at)
+    signs = np.array([1.0, 1.0, sign, sign, 1.0, 1.0])
+
+    def motion_of(point):
+        return np.concatenate([
+            data[f"point_{what}"].sel(point=point).values for what in ("position", "velocity", "acceleration")
+        ]) * signs  # fmt: skip
+
+    for label, right in instant["points"].items():
+        link = next(one for one in (j for j in case["joints"] + case["points"] if j["id"] == label))
+        body = link.get("link") or next(each for each in link["links"] if each != "ground")
+        assert close(motion_of(f"{body}.{label}"), right), label
+    for label, right in instant.get("com", {}).items():
+        assert close(motion_of(f"{label}.com"), right), label
+    for label, (omega, alpha) in instant["links"].items():
+        one = data.sel(body=label)
+        assert close([sign * one["angular_velocity"], one["angular_acceleration"]], [omega, alpha]), label
+
+
+FORCES = [
+    (name, k, scenario) for name, case in REFERENCE.items() for k, instant in enumerate(case["instants"])
+    for scenario in instant.get("dynamics", {})
+]  # fmt: skip
+
+
+@pytest.mark.parametrize(("name", "k", "scenario"), FORCES)
+def test_torques_and_reactions_are_those_of_the_reference_set(name, k, scenario):
+    case = REFERENCE[name]
+    instant = case["instants"][k]
+    gravity = (0.0, -9.81) if scenario == "newton_gravity" else (0.0, 0.0)
+    motion, at, _, crank = reference_motion(pf.torques, case, instant, gravity)
+    data, right = pf.motion_dataset(motion).isel(time=at), instant["dynamics"][scenario]
+    scale = max([1.0, *np.abs(list(right["reactions"].values()) or [0.0]).ravel()])
+    for joint, force in right["reactions"].items():
+        b = motion.system.mechanism.joint(joint).b.body
+        sign = case["ownership"][b][joint]
+        assert close(sign * data["joint_force"].sel(joint=joint), force, scale), joint
+    assert close(data["drive_torque"].sel(drive=crank), right["torque"])
+
+
+def revolute(name, a, b):
+    return pf.RevoluteJoint(name, pf.PointRef.parse(a), pf.PointRef.parse(b))
+
+
+def four_bar(base, crank, coupler, rocker, point=(0.0, 0.0)):
+    return pf.Mechanism(
+        name="four-bar", ground={"O": (0.0, 0.0), "Q": (base, 0.0)},
+        bodies=(
+            pf.RigidBody("crank", points={"O": (0.0, 0.0), "A": (crank, 0.0)}),
+            pf.RigidBody("coupler", points={"A": (0.0, 0.0), "B": (coupler, 0.0), "P": point}),
+            pf.RigidBody("rocker", points={"Q": (0.0, 0.0), "B": (rocker, 0.0)}),
+        ),
+        joints=(
+            revolute("O", "ground.O", "crank.O"), revolute("A", "crank.A", "coupler.A"),
+            revolute("B", "coupler.B", "rocker.B"), revolute("Q", "ground.Q", "rocker.Q"),
+        ),
+        assemblies=(pf.Assembly("open", {"crank": 0.7, "coupler": 0.3, "rocker": 1.0}),),
+    )  # fmt: skip
+
+
+def test_a_textbook_four_bar_has_the_angles_and_rates_of_freudensteins_equations():
+    """Norton, Design of Machinery, 4.5 and 6.7: links of 40, 120, 80 and 100 at 40 degrees, 25 rad/s."""
+    d, a, b, c, crank, omega = 100.0, 40.0, 120.0, 80.0, math.radians(40.0), 25.0
+    motion = pf.kinematics(four_bar(d, a, b, c), "O", start=crank, end=crank + 1.0, speed=omega)
+    first = pf.motion_dataset(motion).isel(time=0)
+    k1, k2, k3, k4 = d / a, d / c, (a**2 - b**2 + c**2 + d**2) / (2 * a * c), d / b
+    k5 = (c**2 - d**2 - a**2 - b**2) / (2 * a * b)
+    A, B, C = math.cos(crank) * (1 - k2) - k1 + k3, -2 * math.sin(crank), k1 - (k2 + 1) * math.cos(crank) + k3
+    D, F = math.cos(crank) * (1 + k4) - k1 + k5, k1 + (k4 - 1) * math.cos(crank) + k5
+    rocker = 2 * math.atan2(-B - math.sqrt(B**2 - 4 * A * C), 2 * A)
+    coupler = 2 * math.atan2(-B - math.sqrt(B**2 - 4 * D * F), 2 * D)
+    rate = a * omega / b * math.sin(rocker - crank) / math.sin(coupler - rocker)
+    other = a * omega / c * math.sin(crank - coupler) / math.sin(rocker - coupler)
+    turned = first["angle"].sel(body=["coupler", "rocker"]).values - [coupler, rocker]
+    assert np.exp(1j * turned) == pytest.approx([1.0, 1.0], abs=1e-12)
+    assert first["angular_velocity"].sel(body=["coupler", "rocker"]).values == pytest.approx([rate, other], rel=1e-12)
+
+
+def test_a_crank_rocker_has_its_known_dead_points_transmission_angles_and_time_ratio():
+    base, crank, coupler, rocker = 0.4, 0.1, 0.35, 0.25
+    found = pf.kinematics(four_bar(base, crank, coupler, rocker), "O").features
+    # At dead points crank and coupler are in line.
+    far, near = (
+        math.acos((base**2 + arm**2 - rocker**2) / (2 * base * arm)) for arm in (coupler + crank, coupler - crank)
+    )
+    drives = sorted((one.drive or 0.0) % (2 * math.pi) for one in found.dead_points["Q"])
+    assert drives == pytest.approx(sorted([far, near + math.pi]), abs=1e-12)
+    forward = (near + math.pi - far) % (2 * math.pi)
+    ratio = max(forward, 2 * math.pi - forward) / min(forward, 2 * math.pi - forward)
+    assert found.time_ratios["Q"] == pytest.approx(ratio, rel=1e-12)
+    (one,) = found.transmissions
+    # The transmission angle is smallest where crank and base are in line.
+    ends = [
+        math.acos((coupler**2 + rocker**2 - (base + side * crank) ** 2) / (2 * coupler * rocker)) for side in (1, -1)
+    ]
+    acute = [min(angle, math.pi - angle) for angle in ends]
+    assert (one.joint, one.coupler) == ("B", "coupler")
+    assert one.smallest.value == pytest.approx(min(acute), abs=1e-12)
+    assert one.largest.value == pytest.approx(math.pi / 2, abs=1e-12)
+    assert found.freedoms == 1
+
+
+def test_a_rocker_that_drives_moves_between_its_limits_of_reach():
+    base, crank, coupler, rocker = 0.4, 0.1, 0.35, 0.25
+    drive = pf.kinematics(four_bar(base, crank, coupler, rocker), "Q").drive
+    low, high = (
+        math.pi - math.acos((base**2 + rocker**2 - arm**2) / (2 * base * rocker))
+        for arm in (coupler + crank, coupler - crank)
+    )
+    assert drive is not None
+    assert drive.reach == pytest.approx((low, high), abs=1e-10)
+    assert low < drive.start < low + 0.01 * (high - low)
+    assert high - 0.01 * (high - low) < drive.end < high
+    assert not drive.full_turn
+
+
+def test_a_quick_return_has_its_closed_form_time_ratio(tmp_path):
+    file = tmp_path / "quick.toml"
+    file.write_text("""
+name = "quick return"
+[ground]
+O = [0, 0]
+Q = [0, "-150 mm"]
+[body.crank]
+points = { O = [0, 0], A = ["100 mm", 0] }
+[body.arm]
+points = { Q = [0, 0], P = ["450 mm", 0] }
+[body.block]
+points = { A = [0, 0] }
+[joint]
+O = ["ground.O", "crank.O"]
+A = ["crank.A", "block.A"]
+Q = ["ground.Q", "arm.Q"]
+S = { points = ["arm.Q", "block.A"], type = "prismatic" }
+[assembly.one]
+crank = 0.3
+arm = "60 deg"
+block = "60 deg"
+""")
+    model = pf.load(file)
+    motion = pf.kinematics(model, "O")
+    side = math.asin(100.0 / 150.0)
+    assert motion.features.time_ratios["Q"] == pytest.approx((math.pi + 2 * side) / (math.pi - 2 * side), rel=1e-11)
+    assert [one.value for one in motion.features.dead_points["S"]] == pytest.approx([0.25, 0.05], abs=1e-12)
+    # Forces need masses, and nothing stands in for them.
+    assert np.isnan(motion.solution.multipliers).all()
+    with pytest.raises(InputError, match=r"body\.crank\.mass: is missing or zero"):
+        pf.torques(model, "O")
+    with pytest.raises(InputError, match=r"body\.crank\.mass"):
+        pf.simulate_motion(model, 1.0)
+
+
+def test_a_coupler_curve_crosses_itself_on_the_circle_of_foci():
+    """Double points lie on the circle through both pivots and the third focus, a triangle as the coupler's."""
+    base, coupler, point = 2.0, 2.5, np.array([1.25, -2.0])
+    motion = pf.kinematics(four_bar(base, 1.0, coupler, 2.5, tuple(point)), "O")
+    (one,) = motion.features.trails["coupler.P"].crunodes
+    focus = point * base / coupler
+    height = (focus @ focus - base * focus[0]) / (2 * focus[1])
+    centre = np.array([base / 2, height])
+    assert np.linalg.norm(one.position - centre) == pytest.approx(np.linalg.norm(centre), abs=1e-12)
+    assert motion.drive is not None
+    assert one.drives == pytest.approx([motion.drive.at(t) for t in one.times])
+    assert abs(one.times[1] - one.times[0]) > 0.1
+
+
+def test_a_point_at_the_instant_centre_has_a_cusp_there():
+    pose = pf.motion_dataset(pf.kinematics(four_bar(0.4, 0.1, 0.35, 0.25), "O", start=1.0, end=2.0)).isel(time=0)
+    A, B = (pose["point_position"].sel(point=name).values for name in ("coupler.A", "coupler.B"))
+    # The instant centre of the coupler is where the lines of crank and rocker meet.
+    s = np.linalg.solve(np.column_stack([A, -(B - [0.4, 0.0])]), [0.4, 0.0])[0]
+    x, y = s * A - A
+    turn = float(pose["angle"].sel(body="coupler"))
+    local = (x * math.cos(turn) + y * math.sin(turn), y * math.cos(turn) - x * math.sin(turn))
+    trail = pf.kinematics(four_bar(0.4, 0.1, 0.35, 0.25, local), "O", start=0.3).features.trails["coupler.P"]
+    assert any(one.drive == pytest.approx(1.0, abs=1e-6) for one in trail.cusps)
+    assert not pf.kinematics(four_bar(0.4, 0.1, 0.35, 0.25, (0.1, 0.1)), "O").features.trails["coupler.P"].cusps
+
+
+def test_all_assemblies_of_a_four_bar_are_the_two_mirrored_in_its_diagonal():
+    found = pf.kinematics(four_bar(0.4, 0.1, 0.35, 0.25), "O", start=1.0).assemblies()
+    assert len(found) == 2
+    A = 0.1 * np.array([math.cos(1.0), math.sin(1.0)])
+    diagonal = math.atan2(-A[1], 0.4 - A[0])
+    both = sum(one.angles["coupler"] for one in found) - 2 * diagonal
+    assert math.cos(both) == pytest.approx(1.0, abs=1e-12)
+    assert all(one.found > 10 for one in found)
+
+
+def test_rigid_torques_are_those_of_an_integrated_run_with_springs_and_loads():
+    mechanism = pf.load("four_bar").mechanism.rigid()
+    mechanism = replace(
+        mechanism, gravity=(0.0, -9.81),
+        springs=(pf.TorsionalSpring("spring", "Q", 3.0, 1.5),), dampers=(pf.TorsionalDamper("damper", "A", 0.02),),
+        frictions=(pf.JointFriction("friction", "B", 0.05, 0.1),),
+        loads=(pf.PointForce("load", pf.PointRef("coupler", "B"), (10.0, -5.0)),),
+    )  # fmt: skip
+    exact = pf.motion_dataset(pf.torques(mechanism))
+    options = pf.IntegrationOptions(tolerance=1e-10)
+    run = pf.simulate_motion(mechanism, 2 * math.pi / 20.0, samples=361, options=options, warning=False)
+    integrated = pf.motion_dataset(run)
+    for name in ("drive_torque", "joint_force", "joint_moment", "frame_force", "frame_moment", "kinetic_energy"):
+        scale = float(abs(integrated[name]).max())
+        assert float(abs(exact[name] - integrated[name]).max()) < 1e-6 * scale, name
+
+
+def test_a_flywheel_absorbs_the_fluctuation_of_a_slider_crank():
+    motion = pf.torques(pf.load("four_bar").mechanism)
+    found = pf.flywheel(motion, 0.05)
+    data = pf.motion_dataset(motion)
+    # Without loads the energy exchanged with the drive is the kinetic energy of the mechanism.
+    energy = data["kinetic_energy"].values
+    assert found.energy == pytest.approx(np.ptp(energy), rel=1e-3)
+    assert found.inertia == pytest.approx(found.energy / (0.05 * 20.0**2), rel=1e-12)
+    assert found.mean_torque == pytest.approx(0.0, abs=1e-9 * float(abs(data["drive_torque"]).max()))
+    assert found.error < 1e-6 * found.inertia
+    for wrong in (0.0, -1.0, math.nan):
+        with pytest.raises(InputError, match="fluctuation: not positive"):
+            pf.flywheel(motion, wrong)
+    with pytest.raises(InputError, match="the motion has no loads"):
+        pf.flywheel(pf.kinematics(pf.load("four_bar")), 0.05)
+    with pytest.raises(InputError, match="whole turn"):
+        pf.flywheel(pf.torques(pf.load("four_bar"), "O", start=0.0, end=1.0), 0.05)
+
+
+@pytest.mark.parametrize(
+    ("given", "message"),
+    [
+        ({"drive": "X"}, "drive: unknown joint"),
+        ({"start": 0.3, "end": 0.3}, "end: the drive does not move"),
+        ({"speed": 0.0}, "speed: not positive"),
+        ({"speed": math.nan}, "speed: not positive"),
+        ({"samples": 1}, "samples: too few"),
+        ({"assembly": "none"}, "assembly"),
+    ],
+)
+def test_wrong_arguments_are_named(given, message):
+    with pytest.raises(InputError, match=message):
+        pf.kinematics(pf.load("four_bar"), **{"drive": "O", **given})
+
+
+def test_drives_that_do_not_determine_the_motion_are_named():
+    with pytest.raises(InputError, match="drive: is missing; name the joint that drives the mechanism: A1, B1"):
+        pf.kinematics(pf.load("five_bar"))
+    with pytest.raises(InputError, match="leave 1 degree of freedom of the mechanism open"):
+        pf.kinematics(pf.load("five_bar"), "A1")
+    chain = pf.Mechanism(
+        name="open chain", ground={"O": (0.0, 0.0)},
+        bodies=(pf.RigidBody("one", points={"O": (0.0, 0.0), "A": (1.0, 0.0)}),
+                pf.RigidBody("two", points={"A": (0.0, 0.0)})),
+        joints=(revolute("O", "ground.O", "one.O"), revolute("A", "one.A", "two.A")),
+        assemblies=(pf.Assembly("a", {"one": 0.1, "two": 0.2}),),
+    )  # fmt: skip
+    with pytest.raises(InputError, match="leave 1 degree of freedom of the mechanism open"):
+        pf.kinematics(chain, "O")
+
+
+def test_a_range_beyond_reach_names_the_limit():
+    with pytest.raises(UnreachablePathError, match=r"Q reaches its limit of reach, 2\.49809 rad"):
+        pf.kinematics(four_bar(0.4, 0.1, 0.35, 0.25), "Q", start=2.0, end=3.0)
