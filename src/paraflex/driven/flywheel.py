@@ -11,6 +11,9 @@ from paraflex.dynamics.joint_loads import drive_torques
 from paraflex.errors import InputError
 from .motion import DrivenMotion
 
+# Mean torques below this part of the largest torque are rounding errors.
+_ROUNDING = 1e-12
+
 
 @dataclass(frozen=True)
 class Flywheel:
@@ -82,6 +85,8 @@ def _energy(angle: np.ndarray, torque: np.ndarray) -> tuple[float, float]:
         scipy.interpolate.CubicSpline(angle[::-1], closed[::-1], bc_type="periodic"))  # fmt: skip
     low, high = sorted((float(angle[0]), float(angle[-1])))
     mean = float(spline.integrate(low, high)) / (high - low)
+    if abs(mean) < _ROUNDING * float(np.max(np.abs(torque))):
+        mean = 0.0
     stored = spline.antiderivative()
     places = np.concatenate([[low], spline.solve(mean, extrapolate=False), [high]])
     values = stored(places) - mean * places

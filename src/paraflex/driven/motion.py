@@ -290,12 +290,16 @@ def _chosen(
     steady = [one for one in prescribed if isinstance(one.profile, ConstantSpeed)]
     given = next((name for name, value in (("start", start), ("end", end), ("speed", speed)) if value is not None), "")
     if joint is None and (len(steady) != 1 or len(prescribed) != 1):
-        motors = [motor.joint for motor in mechanism.motors]
+        moving = [one.name for one in mechanism.joints if one.moves]
+        motors = [motor.joint for motor in mechanism.motors] or moving
         if prescribed and not given:
             return None
         if prescribed or len(motors) != 1:
-            joints = ", ".join(one.name for one in mechanism.joints if one.moves)
-            raise InputError("is missing", field="drive", remedy=f"name the joint that drives the mechanism: {joints}")
+            also = "; paraflex run plans a motion along a path" if mechanism.end_effector else ""
+            raise InputError(
+                "is missing", field="drive",
+                remedy=f"name the joint that drives the mechanism: {', '.join(moving)}{also}",
+            )  # fmt: skip
         joint = motors[0]
     elif joint is None:
         joint = steady[0].joint
@@ -347,6 +351,13 @@ def _loops(mechanism: Mechanism, pose: Array, end: float) -> tuple[LoopClosure, 
 
 
 def _with_drive(mechanism: Mechanism, law: Drive) -> Mechanism:
+    """Return the mechanism with a drive instead of its prescribed motions, and of a motor at the same joint.
+
+    Motors with actuators stay, as their rotors have inertia.
+    """
+    if not mechanism.actuators:
+        motors = tuple(one for one in mechanism.motors if one.joint != law.joint)
+        mechanism = replace(mechanism, motors=motors, modes=())
     return replace(mechanism, prescribed=(PrescribedAngle(law.name, law.joint, law.profile),))
 
 

@@ -9,6 +9,7 @@ import numpy as np
 import xarray as xr
 
 from paraflex.arguments import checked_arguments
+from paraflex.figures.kinematics import kinematics_tables
 from paraflex.figures.reduction import reduced_runs
 from paraflex.figures.run_motion import deflections_of
 from paraflex.figures.selection import as_runs, names_of, samples
@@ -38,6 +39,7 @@ def motion_page(data: xr.Dataset) -> Page:
         facts=common_facts(data),
         figures=_figures(data, loads),
         more=[
+            *sections(kinematics_tables(data)),
             *load_tables(data, loads),
             *sections(reduced_runs(data)),
             ("Integration", _table(data)),

@@ -20,6 +20,7 @@ _LINEAR = (
     "results", "model", "modes", "forces", "prescribed", "pose", "at", "along", "path", "assembly", "coordinates",
     "balanced",
 )  # fmt: skip
+_DRIVEN = ("model", "drive", "start", "end", "speed", *_PLAN, "assemblies")
 _COMMANDS: Mapping[str, Sequence[str]] = {
     "run": (
         "model", "path", "modes", "controllers", *_PLAN, "tolerance", "tolerance_per", "control", "method", "step",
@@ -28,6 +29,8 @@ _COMMANDS: Mapping[str, Sequence[str]] = {
     ),
     "verify": ("model", "path", "modes", "fidelities", "engines", *_PLAN, "tolerance", "method", "segments", *_FRAMES),
     "statics": ("model", "loads", "torques", "moved", "held", "stiffness", "steps", "buckling", "assembly"),
+    "kinematics": _DRIVEN,
+    "torques": (*_DRIVEN, "fluctuation"),
     "linearise": _LINEAR,
     "reduce": (*_LINEAR, "states", "methods", "until", "error", "basis"),
 }  # fmt: skip
@@ -35,7 +38,7 @@ _COMMANDS: Mapping[str, Sequence[str]] = {
 _FLAGS = {
     "tolerance": "--tol", "modes": "--mode", "controllers": "--controller", "method_parameters": "--method-parameter",
     "fidelities": "--model", "engines": "--engine", "loads": "--load", "torques": "--torque", "moved": "--move",
-    "held": "--hold", "forces": "--force-at", "set": "--set", "methods": "--method",
+    "held": "--hold", "forces": "--force-at", "set": "--set", "methods": "--method", "start": "--from", "end": "--to",
 }  # fmt: skip
 
 

@@ -146,6 +146,42 @@ class StaticsRequest:
     files: FilesChoice = field(default_factory=FilesChoice)
 
 
+@dataclass(frozen=True, kw_only=True)
+class KinematicsRequest:
+    """Options of `paraflex kinematics`."""
+
+    model: ModelChoice = field(default_factory=ModelChoice)
+    drive: str | None = option(
+        "--drive JOINT",
+        "Joint that moves at constant speed. Default: the prescribed motions, or the only motor's joint.",
+    )
+    start: str | None = option(
+        "--from VALUE", 'First angle or travel of the drive: "-30 deg". Default: the assembly\'s.'
+    )
+    end: str | None = option(
+        "--to VALUE", "Last angle or travel of the drive. Default: after a whole turn, else between limits of reach."
+    )
+    speed: str | None = option(
+        "--speed VALUE", 'Speed of the drive: "60 rpm". Default: that of its prescribed motion, else 1 rad/s or m/s.'
+    )
+    duration: float | None = option(
+        "--duration S", "Duration of prescribed motions whose speed changes. Default: the study's.", unit="s"
+    )
+    samples: int = option("--samples N", "Number of positions.", default=361)
+    assembly: str | None = assembly_option()
+    assemblies: bool = switch("--assemblies", "Search for all assemblies with the drive at its start.")
+    files: FilesChoice = field(default_factory=FilesChoice)
+
+
+@dataclass(frozen=True, kw_only=True)
+class TorquesRequest(KinematicsRequest):
+    """Options of `paraflex torques`."""
+
+    fluctuation: float | None = option(
+        "--fluctuation RATIO", "Range of the speed over its mean for which a flywheel is computed, such as 0.02."
+    )
+
+
 @dataclass(frozen=True)
 class MethodsRequest:
     """Options of `paraflex methods`."""

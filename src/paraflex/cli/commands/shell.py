@@ -118,6 +118,14 @@ COMMANDS = (
         Equilibria under loads and travel in steps, past limit points: forces, stiffness, buckling, frequencies.
 
         With --out it writes statics.nc, statics.json and figures/."""),
+    ListedCommand("kinematics", models.KinematicsRequest, "kinematics.kinematics_command", """
+        Positions, speeds and accelerations of a driven mechanism: ranges, transmission angles, dead points, curves.
+
+        Needs no masses. With --out it writes results.nc, summary.json, figures/ and report.html, with the motion."""),
+    ListedCommand("torques", models.TorquesRequest, "kinematics.torques_command", """
+        Rigid torques of a driven mechanism, with joint forces, forces on the ground and the flywheel.
+
+        Like kinematics, with masses, loads, springs and friction."""),
     ListedCommand("methods", models.MethodsRequest, "methods.methods_command", """
         List the methods of integration, their options and their treatments of the constraints."""),
     ListedCommand("info", models.InfoRequest, "inspect.info_command", """

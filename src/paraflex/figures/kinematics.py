@@ -1,0 +1,129 @@
+"""Tables of driven motions: ranges, dead points and time ratios of joints, transmission angles, coupler curves."""
+
+import json
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+import numpy as np
+import xarray as xr
+
+from paraflex.results.kinematics import KINEMATICS
+from .selection import names_of
+from .tables import Column, Table
+
+# Largest number of points that are listed.
+_MOST_POINTS = 30
+# Positions within this part of the largest range are equal.
+_SAME = 1e-9
+Found = Mapping[str, Any]
+
+
+def kinematics_of(data: xr.Dataset) -> dict[str, Any]:
+    """Return the properties of a driven motion from its dataset; empty for other runs."""
+    return json.loads(data.attrs.get(KINEMATICS, "{}"))
+
+
+def kinematics_tables(data: xr.Dataset) -> Iterator[Table]:
+    """Yield the tables of a driven motion; none for other runs."""
+    found = kinematics_of(data)
+    if found:
+        for title, unit in (("Angles of joints", "rad"), ("Travels of joints", "m")):
+            yield _joints(data, found, title, unit)
+        yield _transmissions(found)
+        yield _points(data)
+        yield _special(found)
+        yield _assemblies(found)
+
+
+def _place(found: Found) -> tuple[str, str, str]:
+    """Return entry, heading and unit of positions in tables: those of the drive, or times without constant speed."""
+    drive = found["drive"]
+    return ("time", "t", "s") if drive is None else ("drive", drive["joint"], drive["unit"])
+
+
+def _joints(data: xr.Dataset, found: Found, title: str, unit: str) -> Table:
+    """Return the table of the ranges of joints with coordinates in a unit that move, sharp where they reverse."""
+    key, where, place_unit = _place(found)
+    rows, places = [], data["time"].values if found["drive"] is None else _drive_values(data, found)
+    for joint in names_of(data, "joint"):
+        values = data["joint_coordinate"].sel(joint=joint).values
+        if found["joint_units"].get(joint) != unit or not np.ptp(values) > _SAME:
+            continue
+        ends = [(float(values[k]), float(places[k])) for k in (int(np.argmin(values)), int(np.argmax(values)))]
+        ends += [(end["value"], end[key]) for end in found["dead_points"].get(joint, ())]
+        rows.append((joint, *min(ends), *max(ends), found["time_ratios"].get(joint)))
+    columns = list(zip(*rows, strict=True)) if rows else [()] * 6
+    at = f"at {where}"
+    return Table(title, [
+        Column("joint", columns[0]), Column("lowest", columns[1], unit), Column(at, columns[2], place_unit),
+        Column("highest", columns[3], unit), Column(at, columns[4], place_unit), Column("time ratio", columns[5]),
+    ]).filled()  # fmt: skip
+
+
+def _drive_values(data: xr.Dataset, found: Found) -> np.ndarray:
+    drive = found["drive"]
+    return drive["start"] + data["time"].values * np.sign(drive["end"] - drive["start"]) * drive["speed"]
+
+
+def _transmissions(found: Found) -> Table:
+    key, where, unit = _place(found)
+    rows, at = found["transmission_angles"], f"at {where}"
+    return Table("Transmission angles", [
+        Column("joint", [one["joint"] for one in rows]), Column("coupler", [one["coupler"] for one in rows]),
+        Column("smallest", [one["smallest"]["value"] for one in rows], "rad"),
+        Column(at, [one["smallest"][key] for one in rows], unit),
+        Column("largest", [one["largest"]["value"] for one in rows], "rad"),
+        Column(at, [one["largest"][key] for one in rows], unit),
+    ])  # fmt: skip
+
+
+def _points(data: xr.Dataset) -> Table:
+    """Return the table of the points that move, one of those that coincide: range, largest speed and acceleration."""
+    rows, seen = [], []
+    position = data["point_position"].transpose("time", "point", "axis").values
+    least = _SAME * float(np.max(np.ptp(position, axis=0), initial=0.0))
+    for k, point in enumerate(names_of(data, "point")):
+        places = position[:, k]
+        repeated = any(np.allclose(places, other, rtol=0.0, atol=least) for other in seen)
+        if np.max(np.ptp(places, axis=0)) > least and not repeated and len(rows) < _MOST_POINTS:
+            one = data.sel(point=point)
+            most = [float(np.max(np.linalg.norm(one[f"point_{name}"].transpose("time", "axis").values, axis=1)))
+                    for name in ("velocity", "acceleration")]  # fmt: skip
+            ends = np.stack([places.min(axis=0), places.max(axis=0)], axis=1)
+            ends[np.abs(ends) < least] = 0.0
+            rows.append((point, *ends.ravel().tolist(), *most))
+            seen.append(places)
+    columns = list(zip(*rows, strict=True)) if rows else [()] * 7
+    heads = [("x from", "m"), ("x to", "m"), ("y from", "m"), ("y to", "m"), ("speed", "m/s"),
+             ("acceleration", "m/s^2")]  # fmt: skip
+    return Table("Points: ranges, largest speed and acceleration at the samples", [
+        Column("point", columns[0]),
+        *(Column(name, cells, unit) for (name, unit), cells in zip(heads, columns[1:], strict=True)),
+    ])  # fmt: skip
+
+
+def _special(found: Found) -> Table:
+    """Return the table of cusps and crunodes of coupler curves."""
+    key, where, unit = _place(found)
+    several = f"{key}s"
+    rows = [
+        (point, kind, *each["position"], each[key] if kind == "cusp" else each[several][0],
+         None if kind == "cusp" else each[several][1])
+        for point, trail in found["trails"].items() for kind in ("cusp", "crunode") for each in trail[f"{kind}s"]
+    ]  # fmt: skip
+    columns = list(zip(*rows, strict=True)) if rows else [()] * 6
+    return Table("Special points of coupler curves", [
+        Column("point", columns[0]), Column("kind", columns[1]), Column("x", columns[2], "m"),
+        Column("y", columns[3], "m"), Column(f"at {where}", columns[4], unit), Column("and at", columns[5], unit),
+    ]).filled()  # fmt: skip
+
+
+def _assemblies(found: Found) -> Table:
+    """Return the table of the assemblies that were searched for: angles of all bodies at the start."""
+    rows = found.get("assemblies", [])
+    bodies = list(rows[0]["angles"]) if rows else []
+    return Table("Assemblies with the drive at its start, that of the motion first", [
+        Column("assembly", list(range(1, len(rows) + 1))),
+        *(Column(body, [one["angles"][body] for one in rows], "rad") for body in bodies),
+        Column("found", [one["found"] for one in rows]),
+    ])  # fmt: skip
