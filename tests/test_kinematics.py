@@ -2,6 +2,7 @@
 
 import json
 import math
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -10,8 +11,11 @@ import pytest
 
 import paraflex as pf
 from paraflex.errors import InputError, UnreachablePathError
+from shell import paraflex
 
-REFERENCE = {one["name"]: one for one in json.loads((Path(__file__).parent / "pmks.json").read_text())["mechanisms"]}
+REFERENCE = {
+    one["name"]: one for one in json.loads((Path(__file__).parent / "data" / "pmks.json").read_text())["mechanisms"]
+}
 # Relative to the largest number of a kind; the reference is right to about 1e-13.
 EXACT = 1e-9
 
@@ -344,3 +348,80 @@ def test_drives_that_do_not_determine_the_motion_are_named():
 def test_a_range_beyond_reach_names_the_limit():
     with pytest.raises(UnreachablePathError, match=r"Q reaches its limit of reach, 2\.49809 rad"):
         pf.kinematics(four_bar(0.4, 0.1, 0.35, 0.25), "Q", start=2.0, end=3.0)
+
+
+ROCKER = """
+name = "rocker"
+[ground]
+O = [0, 0]
+Q = ["400 mm", 0]
+[body.crank]
+points = { O = [0, 0], A = ["100 mm", 0] }
+[body.coupler]
+points = { A = [0, 0], B = ["350 mm", 0], P = ["175 mm", "-280 mm"] }
+[body.rocker]
+points = { Q = [0, 0], B = ["250 mm", 0] }
+[joint]
+O = ["ground.O", "crank.O"]
+A = ["crank.A", "coupler.A"]
+B = ["coupler.B", "rocker.B"]
+Q = ["ground.Q", "rocker.Q"]
+[assembly.open]
+crank = "60 deg"
+coupler = "25 deg"
+rocker = "100 deg"
+"""
+
+
+@pytest.fixture
+def rocker(tmp_path):
+    file = tmp_path / "rocker.toml"
+    file.write_text(ROCKER)
+    return file
+
+
+def test_the_commands_write_results_that_other_commands_take(rocker, tmp_path):
+    folder = tmp_path / "k"
+    done = paraflex("kinematics", rocker, "--drive", "O", "--assemblies", "--out", folder)
+    assert done.returncode == 0, done.stderr
+    assert "1 degree of freedom; O moves from 1.0472 rad to 7.3304 rad, a whole turn" in done.stdout
+    assert "crunode" in done.stdout
+    found = json.loads(pf.load_results(folder).attrs["kinematics"])
+    assert len(found["assemblies"]) == 2
+    assert found["drive"]["full_turn"]
+    page = (folder / "report.html").read_text(encoding="utf-8")
+    assert "Transmission angles" in page
+    assert "paraflex kinematics" in page
+    summary = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
+    assert summary["kinematics"]["time_ratios"]["Q"] == pytest.approx(1.0374965917973495)
+    # Without masses no force has a value, and none is zero.
+    assert all(one["force_max"] is None for one in summary["loads"]["joints"].values())
+    assert summary["loads"]["drives"]["O"]["torque_max"] is None
+    assert paraflex("plot", folder, "--out", tmp_path / "figures").returncode == 0
+    done = paraflex("torques", "four_bar", "--speed", "100 rpm", "--drive", "O", "--fluctuation", "0.02")
+    assert "flywheel for a fluctuation of 0.02: 0.0754 kg m^2" in done.stdout
+
+
+@pytest.mark.parametrize(
+    ("words", "message"),
+    [
+        (["torques", "FILE", "--drive", "O"], r"body\.crank\.mass: is missing or zero"),
+        (["run", "FILE", "--duration", "1"], r"body\.crank\.mass: is missing or zero"),
+        (["kinematics", "FILE"], "--drive: is missing; name the joint that drives the mechanism: O, A, B, Q"),
+        (
+            ["kinematics", "FILE", "--drive", "O", "--from", "1 kg"],
+            "--from: a quantity in kg where one in rad is asked",
+        ),
+        (["kinematics", "FILE", "--drive", "O", "--speed", "nan"], "--speed"),
+        (["kinematics", "FILE", "--drive", "Q", "--to", "3"], "--drive: Q reaches its limit of reach, 2.49809 rad"),
+        (["torques", "four_bar", "--fluctuation", "0"], "--fluctuation: not positive"),
+        (["torques", "four_bar", "--drive", "Q", "--fluctuation", "0.1"], "--fluctuation: a flywheel needs a drive"),
+    ],
+)
+def test_wrong_requests_are_answered_in_one_line(rocker, tmp_path, words, message):
+    words = [str(rocker) if word == "FILE" else word for word in words]
+    done = paraflex(*words, "--out", tmp_path / "out")
+    assert done.returncode == 2, done.stdout
+    (line,) = done.stderr.strip().splitlines()
+    assert re.search(message, line)
+    assert not (tmp_path / "out").exists()

@@ -23,6 +23,7 @@ PACKAGES = (
     "actuation",
     "tracking",
     "motion",
+    "driven",
     "validity",
     "elastodynamics",
     "reduced_bodies",

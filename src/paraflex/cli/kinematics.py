@@ -12,8 +12,8 @@ from paraflex.figures.kinematics import kinematics_of, kinematics_tables
 from paraflex.files import Model
 from paraflex.files.fields import number_in
 from paraflex.formatting import number, quantity
-from paraflex.results import motion_summary
-from paraflex.results.kinematics import kinematics_dataset
+from paraflex.results import motion_dataset, motion_summary
+from paraflex.results.kinematics import add_kinematics
 from . import COMPLETE
 from .commands.models import KinematicsRequest, TorquesRequest
 from .commands.requests import flagged
@@ -49,7 +49,10 @@ def _data(model: Model, request: KinematicsRequest) -> xr.Dataset:
     given = {one.name: getattr(request, one.name) for one in fields(request) if one.name not in ("model", "files")}
     command = "torques" if isinstance(request, TorquesRequest) else "kinematics"
     parameters = command_provenance(model, {command: True} | {name: value for name, value in given.items() if value})
-    return kinematics_dataset(motion, assemblies=request.assemblies, flywheel=wheel, parameters=parameters)
+    data = motion_dataset(motion, parameters=parameters)
+    if request.assemblies or wheel is not None:
+        add_kinematics(data, motion, assemblies=request.assemblies, flywheel=wheel)
+    return data
 
 
 def _quantities(model: Model, request: KinematicsRequest) -> dict[str, float]:

@@ -1,6 +1,7 @@
 """Motion of a rigid mechanism that its drives determine: kinematics, inverse dynamics, and properties of the motion."""
 
 from .assemblies import assemblies_of as assemblies_of
+from .exact import Drive as Drive, ExactMotion as ExactMotion
 from .features import (
     KinematicFeatures as KinematicFeatures,
     Trail as Trail,
@@ -8,4 +9,4 @@ from .features import (
     features_of as features_of,
 )
 from .flywheel import Flywheel as Flywheel, flywheel as flywheel
-from .motion import Drive as Drive, DrivenMotion as DrivenMotion, kinematics as kinematics, torques as torques
+from .motion import DrivenMotion as DrivenMotion, kinematics as kinematics, torques as torques

@@ -1,15 +1,13 @@
 """All assemblies of a mechanism at one position of its drives."""
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from paraflex.dynamics import reference_pose
 from paraflex.kernel.closure import LOOPS_CLOSED
 from paraflex.mechanism import Assembly
-
-if TYPE_CHECKING:
-    from .motion import DrivenMotion
+from .exact import ExactMotion
 
 # Random starts, and the distance within which two poses are one [sizes of the mechanism, rad].
 _STARTS, _SAME = 200, 1e-6
@@ -22,7 +20,7 @@ class FoundAssembly(NamedTuple):
     found: int
 
 
-def assemblies_of(motion: "DrivenMotion", starts: int = _STARTS) -> list[FoundAssembly]:
+def assemblies_of(motion: ExactMotion, starts: int = _STARTS) -> list[FoundAssembly]:
     """Search for the assemblies in which the loops close with the drives as at the start of a motion.
 
     Newton's method starts from random angles of all bodies (fixed seed). An assembly that few starts lead to suggests
@@ -30,7 +28,7 @@ def assemblies_of(motion: "DrivenMotion", starts: int = _STARTS) -> list[FoundAs
 
     Parameters
     ----------
-    motion : DrivenMotion
+    motion : ExactMotion
         Motion whose first sample gives the drives.
     starts : int
         Number of random starts.

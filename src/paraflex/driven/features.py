@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from functools import partial
 from itertools import pairwise
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import scipy
@@ -18,9 +18,7 @@ from paraflex.dynamics import axis_angle, joint_coordinate
 from paraflex.dynamics.joint_coordinates import unit_vectors
 from paraflex.dynamics.points import PointMotion, cross, marker_position, point_motion
 from paraflex.mechanism import GROUND, Joint, PointRef
-
-if TYPE_CHECKING:
-    from .motion import DrivenMotion
+from .exact import ExactMotion
 
 # Rates below this part of the largest are zero.
 _ZERO = 1e-11
@@ -136,7 +134,7 @@ class KinematicFeatures:
                 "time_ratios": dict(self.time_ratios), "trails": trails}  # fmt: skip
 
 
-def features_of(motion: "DrivenMotion") -> KinematicFeatures:
+def features_of(motion: ExactMotion) -> KinematicFeatures:
     """Compute the properties of a driven motion; see `KinematicFeatures`."""
     dead = {name: ends for name in _followers(motion) if (ends := tuple(_dead_points(motion, name)))}
     ratios = {}
@@ -148,16 +146,16 @@ def features_of(motion: "DrivenMotion") -> KinematicFeatures:
     return KinematicFeatures(motion.mobility.freedoms, tuple(_transmissions(motion)), dead, ratios, trails)
 
 
-def _driven(motion: "DrivenMotion") -> set[str]:
+def _driven(motion: ExactMotion) -> set[str]:
     return {one.joint for one in motion.system.mechanism.prescribed}
 
 
-def _followers(motion: "DrivenMotion") -> list[str]:
+def _followers(motion: ExactMotion) -> list[str]:
     """Return the joints that move and are not driven."""
     return [one.name for one in motion.system.mechanism.joints if one.moves and one.name not in _driven(motion)]
 
 
-def _at(motion: "DrivenMotion", value: float, t: float) -> Extreme:
+def _at(motion: ExactMotion, value: float, t: float) -> Extreme:
     return Extreme(value, t, None if motion.drive is None else motion.drive.at(t))
 
 
@@ -178,11 +176,11 @@ def _sign_changes(
         yield float(t[0])
 
 
-def _repeats(motion: "DrivenMotion") -> bool:
+def _repeats(motion: ExactMotion) -> bool:
     return motion.drive is not None and motion.drive.full_turn
 
 
-def _dead_points(motion: "DrivenMotion", name: str) -> Iterator[Extreme]:
+def _dead_points(motion: ExactMotion, name: str) -> Iterator[Extreme]:
     """Yield the positions at which a joint reverses."""
     solution, system = motion.solution, motion.system
     rates = joint_coordinate(system, name, solution.q, solution.v).rate
@@ -198,7 +196,7 @@ def _dead_points(motion: "DrivenMotion", name: str) -> Iterator[Extreme]:
         yield _at(motion, float(joint_coordinate(system, name, motion.at(t).q).value[0]), t)
 
 
-def _guides(motion: "DrivenMotion") -> dict[str, Joint]:
+def _guides(motion: ExactMotion) -> dict[str, Joint]:
     """Return the joint that guides each body on the ground: a pivot or an axis; bodies with others are left out."""
     found: dict[str, list[Joint]] = {}
     for joint in motion.system.mechanism.joints:
@@ -212,7 +210,7 @@ def _ends(joint: Joint, body: str) -> tuple[PointRef, PointRef]:
     return (joint.a, joint.b) if joint.a.body == body else (joint.b, joint.a)
 
 
-def _couplers(motion: "DrivenMotion") -> Iterator[tuple[str, str, PointRef, PointRef]]:
+def _couplers(motion: ExactMotion) -> Iterator[tuple[str, str, PointRef, PointRef]]:
     """Yield the links with two pins: name, joint at the far end, that point of the other body, the near point."""
     mechanism = motion.system.mechanism
     for body in mechanism.bodies:
@@ -226,7 +224,7 @@ def _couplers(motion: "DrivenMotion") -> Iterator[tuple[str, str, PointRef, Poin
             yield one.name, one.name, one.a, one.b
 
 
-def _transmissions(motion: "DrivenMotion") -> Iterator[Transmission]:
+def _transmissions(motion: ExactMotion) -> Iterator[Transmission]:
     """Yield the transmission angles of couplers at bodies that are guided by the ground and not driven."""
     guides, driven, t = _guides(motion), _driven(motion), motion.solution.t
     for coupler, joint, far, near in _couplers(motion):
@@ -247,7 +245,7 @@ def _transmissions(motion: "DrivenMotion") -> Iterator[Transmission]:
         yield Transmission(joint, coupler, *ends)
 
 
-def _pressure_angle(motion: "DrivenMotion", far: PointRef, near: PointRef, guide: Joint, q: Array) -> Array:
+def _pressure_angle(motion: ExactMotion, far: PointRef, near: PointRef, guide: Joint, q: Array) -> Array:
     """Return the angle (k,) between the line of a coupler and the motion that it imparts, in [-pi/2, pi/2]."""
     system = motion.system
     along = _places(motion, far, q) - _places(motion, near, q)
@@ -263,7 +261,7 @@ def _cosine(a: Array, b: Array) -> Array:
     return np.sum(a * b, axis=1) / (np.linalg.norm(a, axis=1) * np.linalg.norm(b, axis=1))
 
 
-def _places(motion: "DrivenMotion", ref: PointRef, q: Array) -> Array:
+def _places(motion: ExactMotion, ref: PointRef, q: Array) -> Array:
     return marker_position(motion.system, motion.system.marker(ref), q)
 
 
@@ -277,7 +275,7 @@ def _peak(t: Array, values: Array, function: Callable[[float], float]) -> float:
     return float(found.x) if -found.fun > values[k] else float(t[k])
 
 
-def _coupler_points(motion: "DrivenMotion") -> list[PointRef]:
+def _coupler_points(motion: ExactMotion) -> list[PointRef]:
     """Return the named points of bodies that are not guided by the ground alone, one at each joint."""
     mechanism, guides = motion.system.mechanism, _guides(motion)
     taken = {one.b for one in mechanism.joints} | {one.a for one in mechanism.joints if one.b.on_ground}
@@ -287,7 +285,7 @@ def _coupler_points(motion: "DrivenMotion") -> list[PointRef]:
     return [ref for ref in refs if ref.body not in guides and ref not in taken | guided]
 
 
-def _trail(motion: "DrivenMotion", ref: PointRef) -> Trail:
+def _trail(motion: ExactMotion, ref: PointRef) -> Trail:
     """Return cusps and crossings of the path of a point."""
     system, solution = motion.system, motion.solution
 
@@ -323,7 +321,7 @@ def _pair(xy: Array) -> tuple[float, float]:
 
 
 def _crossings(
-    motion: "DrivenMotion", path: Array, there: Callable[[float], PointMotion]
+    motion: ExactMotion, path: Array, there: Callable[[float], PointMotion]
 ) -> Sequence[tuple[float, float]]:
     """Return the pairs of times at which a path (k, 2) crosses itself; none if it retraces itself."""
     t, found = motion.solution.t, []

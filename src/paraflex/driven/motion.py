@@ -4,18 +4,16 @@ import math
 import time
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import ClassVar, NamedTuple
+from typing import ClassVar
 
 import numpy as np
 
 from paraflex.arguments import checked_arguments, named_in_errors
 from paraflex.arrays import Array
-from paraflex.dynamics import System, assembled_position, build_system, dependence, still_signals
+from paraflex.dynamics import System, assembled_position, build_system, dependence, reference_pose, still_signals
 from paraflex.dynamics.joint_coordinates import joint_value, value_text
-from paraflex.dynamics.soundness import Mobility, mobility
-from paraflex.dynamics.state import State
 from paraflex.dynamics.stiffness import RestingForces
-from paraflex.errors import InputError, Moment, UnreachablePathError
+from paraflex.errors import AssemblyError, InputError, Moment, UnreachablePathError
 from paraflex.findings import Finding
 from paraflex.formatting import quantity
 from paraflex.integrators import Solution
@@ -24,12 +22,13 @@ from paraflex.kernel.constraints import constraint_values
 from paraflex.kernel.packed import make_scratch
 from paraflex.limits import solvable
 from paraflex.mechanism import ConstantSpeed, Mechanism, PrescribedAngle, standing
-from paraflex.mechanism.bodies import with_any_masses
+from paraflex.mechanism.masses import with_any_masses
 from paraflex.mechanism.quantities import known
 from paraflex.motion import MotionRun
 from paraflex.paths import ModelWithPaths
 from paraflex.paths.loops import LoopClosure
 from .assemblies import FoundAssembly, assemblies_of
+from .exact import NO_TASKS, Drive, ExactMotion, no_target
 from .features import KinematicFeatures, features_of
 from .limits import limit_of_reach
 
@@ -37,63 +36,7 @@ from .limits import limit_of_reach
 _MARGIN = 1e-3
 # Largest travel of a sliding drive whose range is not given, in sizes of the mechanism.
 _LONGEST_TRAVEL = 4.0
-_NO_TASKS = np.zeros(0, dtype=np.int64)
 _GIVE_RANGE = "give the start and end of its travel"
-
-
-class Motions(NamedTuple):
-    """Coordinates, velocities and accelerations (k, n) at some times."""
-
-    q: Array
-    v: Array
-    a: Array
-
-
-@dataclass(frozen=True)
-class Drive:
-    """Joint that moves the mechanism, at constant speed.
-
-    Attributes
-    ----------
-    name, joint : str
-        Name of the prescribed motion, and of its joint.
-    start, end : float
-        First and last angle [rad] or travel [m] of the joint.
-    speed : float
-        Speed, positive [rad/s, m/s].
-    unit : str
-        Unit of its coordinate: "rad" or "m".
-    reach : tuple of float or None
-        Lowest and highest angle or travel that the mechanism allows in this assembly, None for those that do not lie
-        in the range examined.
-    """
-
-    name: str
-    joint: str
-    start: float
-    end: float
-    speed: float
-    unit: str
-    reach: tuple[float | None, float | None] = (None, None)
-
-    @property
-    def full_turn(self) -> bool:
-        """Whether the joint makes a whole turn, after which the motion repeats."""
-        return self.unit == "rad" and math.isclose(abs(self.end - self.start), 2.0 * math.pi, rel_tol=1e-9)
-
-    @property
-    def duration(self) -> float:
-        """Time of the travel [s]."""
-        return abs(self.end - self.start) / self.speed
-
-    @property
-    def profile(self) -> ConstantSpeed:
-        """Angle or travel over time."""
-        return ConstantSpeed(self.start, math.copysign(self.speed, self.end - self.start))
-
-    def at(self, t: float) -> float:
-        """Return the angle or travel at a time [s]."""
-        return self.start + t * self.profile.speed
 
 
 @named_in_errors("a driven motion", "the motion that kinematics returns")
@@ -122,30 +65,18 @@ class DrivenMotion(MotionRun):
         return ()
 
     @cached_property
-    def features(self) -> KinematicFeatures:
-        """Transmission angles, dead points, time ratios and coupler curves."""
-        return features_of(self)
+    def exact(self) -> ExactMotion:
+        """The motion at any time, exact to rounding."""
+        return ExactMotion(self.system, self.solution, self.drive, self.loops)
 
     @cached_property
-    def mobility(self) -> Mobility:
-        """Degrees of freedom without the drives, and redundant constraints, at the first sample."""
-        mechanism = replace(self.loops.system.mechanism, prescribed=())
-        return mobility(build_system(mechanism), State(0.0, self.solution.q[0], self.solution.v[0]))
+    def features(self) -> KinematicFeatures:
+        """Transmission angles, dead points, time ratios and coupler curves."""
+        return features_of(self.exact)
 
     def assemblies(self, starts: int = 200) -> list[FoundAssembly]:
         """Return all assemblies found with the drives as at the first sample; see `assemblies_of`."""
-        return assemblies_of(self, starts)
-
-    def at(self, t: float) -> Motions:
-        """Return the motion (1, n) at a time within the samples [s], exact to rounding."""
-        k = int(np.clip(np.searchsorted(self.solution.t, t) - 1, 0, self.solution.t.size - 1))
-        times = np.array([self.solution.t[k], t])
-        found = self.loops.follow(_no_target, times, np.array([False, True]), self.solution.q[k].copy())
-        return Motions(*found.arrays[1:4])
-
-
-def _no_target(times: Array) -> Array:
-    return np.zeros((times.size, 3, 0))
+        return assemblies_of(self.exact, starts)
 
 
 @checked_arguments()
@@ -261,19 +192,28 @@ def _driven(
     if samples < 2:
         raise InputError("too few", field="samples", value=samples, remedy="give at least 2")
     moved = standing(mechanism.rigid(), assembly)
-    begun = LoopClosure(moved, 0.0, None, _NO_TASKS)
-    pose = begun.assembled(moved.assembly(assembly))
-    law = _chosen(moved, drive, start, end, speed, begun.system, pose)
+    begun = LoopClosure(moved, 0.0, None, NO_TASKS)
+    near = reference_pose(begun.system, moved.assembly(assembly))
+    law = _chosen(moved, drive, start, end, speed, begun.system, near)
     if law is None:
         if duration is None or not duration > 0.0:
             raise InputError(
                 "is missing" if duration is None else "not positive", field="duration", value=duration,
                 remedy="give it in seconds, or name a drive",
             )  # fmt: skip
-        loops, pose = _loops(moved, pose, duration)
+        loops, pose = _loops(moved, near, duration)
         arrays = _followed(loops, np.linspace(0.0, duration, samples), pose)
     else:
-        loops, pose, law = _ranged(moved, law, pose, fixed=end is not None)
+        try:
+            loops, pose, law = _ranged(moved, law, near, fixed=end is not None)
+        except AssemblyError:
+            if start is not None:
+                raise
+            # The assembly's angle of the drive is approximate: another joint's may be nearer.
+            closed = begun.assembled(moved.assembly(assembly))
+            law = _chosen(moved, drive, start, end, speed, begun.system, closed)
+            assert law is not None
+            loops, pose, law = _ranged(moved, law, closed, fixed=end is not None)
         moved = loops.mechanism
         arrays = _followed(loops, np.linspace(0.0, law.duration, samples), pose, law)
     system = build_system(moved)
@@ -329,7 +269,7 @@ def _chosen(
 
 def _loops(mechanism: Mechanism, pose: Array, end: float) -> tuple[LoopClosure, Array]:
     """Return the closure of a mechanism moved by its prescribed motions, and the pose at their start."""
-    loops = LoopClosure(mechanism, end, None, _NO_TASKS)
+    loops = LoopClosure(mechanism, end, None, NO_TASKS)
     system = loops.system
     pose = assembled_position(system, loops.signals, 0.0, pose)
     free = system.n - system.m
@@ -372,7 +312,7 @@ def _ranged(mechanism: Mechanism, law: Drive, pose: Array, *, fixed: bool) -> tu
         return loops, pose, law
     ends = []
     for way in (law, replace(law, end=2.0 * law.start - law.end)):
-        there = LoopClosure(_with_drive(mechanism, way), way.duration, None, _NO_TASKS)
+        there = LoopClosure(_with_drive(mechanism, way), way.duration, None, NO_TASKS)
         stopped = _reached(there, way, pose)
         limit = None if stopped is None else limit_of_reach(there.system, stopped)
         if limit is None:
@@ -382,11 +322,11 @@ def _ranged(mechanism: Mechanism, law: Drive, pose: Array, *, fixed: bool) -> tu
     reach, inside = (low, high), _MARGIN * (high - low)
     span = (low + inside, high - inside) if law.end > law.start else (high - inside, low + inside)
     back = replace(law, end=span[0])
-    there = LoopClosure(_with_drive(mechanism, back), max(back.duration, 1e-6), None, _NO_TASKS)
+    there = LoopClosure(_with_drive(mechanism, back), max(back.duration, 1e-6), None, NO_TASKS)
     if span[0] != law.start:
         pose = _followed(there, np.array([0.0, back.duration]), pose, back)[1][-1]
     law = replace(law, start=span[0], end=span[1], reach=reach)
-    return LoopClosure(_with_drive(mechanism, law), law.duration, None, _NO_TASKS), pose, law
+    return LoopClosure(_with_drive(mechanism, law), law.duration, None, NO_TASKS), pose, law
 
 
 def _grid(duration: float) -> Array:
@@ -396,13 +336,13 @@ def _grid(duration: float) -> Array:
 def _reached(loops: LoopClosure, law: Drive, pose: Array) -> Array | None:
     """Return the last pose with closed loops before the end of a drive's travel; None if it covers all of it."""
     times = _grid(law.duration)
-    found = loops.follow(_no_target, times, np.ones(times.size, dtype=bool), pose.copy())
+    found = loops.follow(no_target, times, np.ones(times.size, dtype=bool), pose.copy())
     return None if found.closed else found.last
 
 
 def _followed(loops: LoopClosure, times: Array, pose: Array, law: Drive | None = None) -> tuple[Array, ...]:
     """Return times, coordinates, velocities and accelerations along the whole motion."""
-    found = loops.follow(_no_target, times, np.ones(times.size, dtype=bool), pose.copy())
+    found = loops.follow(no_target, times, np.ones(times.size, dtype=bool), pose.copy())
     if not found.closed:
         raise _barred(law, loops, found.last, found.stopped)
     return found.arrays[:4]

@@ -14,7 +14,7 @@ from paraflex.kernel.constraints import constraint_values, fill_jacobian
 from paraflex.kernel.packed import CONSTRAINT, PackedSystem, Signals, Workspace, make_scratch, make_workspace
 from paraflex.limits import solvable
 from paraflex.mechanism import Mechanism, PointRef, in_frames, rotor_mass, with_actuators
-from paraflex.mechanism.bodies import check_masses
+from paraflex.mechanism.masses import check_masses
 from .body_bases import is_reduced, reduced_body
 from .constraints import RowTerm, row_order, terms_by_joint
 from .coordinates import BodyCoordinates, Marker, PlacedBodies, body_coordinates

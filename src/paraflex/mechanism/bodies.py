@@ -1,10 +1,10 @@
 """Rigid bodies, flexible beams and bars of assumed modes, with named points in the body frame."""
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from enum import Enum
 from functools import cached_property
-from typing import TYPE_CHECKING, TypeVar
+from typing import TypeVar
 
 from paraflex.arguments import CheckedFields, named_in_errors
 from paraflex.errors import InputError
@@ -23,9 +23,6 @@ from .damping import Damping
 from .modal import DAMPING, MODES, DeformableBody, ModalBody
 from .quantities import field_metadata, finite, not_negative, optional, positive
 from .sections import Section
-
-if TYPE_CHECKING:
-    from .mechanism import Mechanism
 
 T = TypeVar("T")
 _LENGTH = field_metadata("the length in m", positive)
@@ -343,30 +340,3 @@ named_in_errors("a body")(Body)
 def given_shapes(bodies: Iterable[Body]) -> list[str]:
     """Return the names of the flexible bodies with user-defined shapes, which have no mesh to refine."""
     return [body.name for body in bodies if isinstance(body, AssumedModesBeam | ModalBody) and body.flexible]
-
-
-def check_masses(mechanism: "Mechanism") -> None:
-    """Check that every rigid body has a mass and a moment of inertia.
-
-    Raises
-    ------
-    InputError
-        A body has none.
-    """
-    for body in mechanism.bodies:
-        for name, unit in (("mass", "kg"), ("inertia", "kg m^2")):
-            if isinstance(body, RigidBody) and not getattr(body, name):
-                raise InputError(
-                    "is missing or zero, and forces depend on it", field=f"body.{body.name}.{name}",
-                    remedy=f"give it in {unit}; kinematics does without, and a rod without mass between two pins is a "
-                    'joint of type = "distance"',
-                )  # fmt: skip
-
-
-def with_any_masses(mechanism: "Mechanism") -> "Mechanism":
-    """Return the mechanism with any masses where rigid bodies have none, for motions that do not depend on them."""
-    bodies = tuple(
-        replace(body, mass=body.mass or 1.0, inertia=body.inertia or 1.0)
-        if isinstance(body, RigidBody) and not (body.mass and body.inertia) else body for body in mechanism.bodies
-    )  # fmt: skip
-    return mechanism if bodies == mechanism.bodies else replace(mechanism, bodies=bodies)

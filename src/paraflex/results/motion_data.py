@@ -9,6 +9,7 @@ import xarray as xr
 
 from paraflex.arguments import checked_arguments
 from paraflex.control.loop.runs import ControlledMotion
+from paraflex.driven import DrivenMotion
 from paraflex.findings import Finding
 from paraflex.integrators import IntegrationOptions
 from paraflex.integrators.methods import title_of
@@ -18,6 +19,7 @@ from .acting import load_variables
 from .controllers import with_controllers
 from .findings import keep_findings, validity_variables
 from .kinds import RUN_FIGURES
+from .kinematics import add_kinematics
 from .labelled import Variables, error_variables, label, link_coordinates, padded, provenance, with_totals
 from .links import system_links
 
@@ -85,5 +87,7 @@ def motion_dataset(
     }
     if isinstance(run, ControlledMotion):
         out = with_controllers(out, [run.controllers], [motor.name for motor in mechanism.motors])
+    if isinstance(run, DrivenMotion):
+        add_kinematics(out, run)
     keep_findings(out, [*findings, *implausible_numbers(mechanism), *beyond_range(run.validity), *run.findings])
     return out

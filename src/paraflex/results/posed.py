@@ -12,7 +12,7 @@ from paraflex.dynamics.rank import joint_of_row
 from paraflex.errors import InputError, NumericalError
 from paraflex.formatting import number
 from paraflex.mechanism import Mechanism, PointRef, Start
-from paraflex.mechanism.bodies import with_any_masses
+from paraflex.mechanism.masses import with_any_masses
 from paraflex.paths import Path, follow_path
 from .acting import first_movements, first_movements_along
 from .drawing import DrawnRun, drawing_data, system_drawing
