@@ -116,7 +116,8 @@ FIELDS = [
     # Names
     ("gravity = [", "gravty = [", "gravty: unknown field (got [0.0, -9.81])", 'did you mean "gravity"?'),
     ("elements = 2", "element = 2", "body.left.element: unknown field (got 2)", 'did you mean "elements"?'),
-    ("mass = 0.4", "weight = 0.4", "body.right.mass: is missing", "give the mass in kg"),
+    ("mass = 0.4", "weight = 0.4", "body.right.weight: unknown field (got 0.4)", "centre_of_mass, inertia, mass"),
+    ("mass = 0.4\n", "", "body.right.mass: must be positive (got 0.0)", "in kg"),
     ("mass = 0.4", "center = [0, 0]\nmass = 0.4", "body.right.center: unknown field", 'did you mean "centre_of_mass"?'),
     ("[spring.coil]", "[sprng.coil]", "sprng: unknown field", 'did you mean "spring"?'),
     ("stiffness = 2.0", "stifness = 2.0", "spring.coil.stifness: unknown field", 'did you mean "stiffness"?'),

@@ -167,7 +167,7 @@ def test_a_slider_driven_elsewhere_keeps_the_side_of_the_crank(crank):
 def test_planned_motions_start_on_the_branch_too():
     mechanism = four_bar(LENGTHS, 1.0, 1.0, ConstantSpeed(-0.5, 1.0), end_effector=EndEffector(PointRef("rocker", "B")))
     closure = PathClosure(mechanism, 0.0, 1.0)
-    q = closure.assemble(mechanism.assembly())
+    q = closure.assembled(mechanism.assembly())
     assert np.max(off_by_turns(found_angles(mechanism, q), angles_of(LENGTHS, -0.5, 1.0))) < 1e-9
 
 

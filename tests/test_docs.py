@@ -32,7 +32,7 @@ import documented  # noqa: E402
         ("python-mechanisms.md", 6),
         ("stresses.md", 2),
         ("quick-return.md", 4),
-        ("kinematics.md", 5),
+        ("kinematics.md", 4),
         ("linear-models.md", 3),
         ("shaping.md", 3),
         ("reduction.md", 5),

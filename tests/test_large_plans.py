@@ -30,7 +30,7 @@ from paraflex.paths.paths import Line
 from paraflex.tracking import plan_tracking
 from paraflex.validity.numbers import mechanism_size
 
-DENSE = "paraflex.paths.closure.DENSE_ROWS", "paraflex.paths.reach.DENSE_ROWS"
+DENSE = "paraflex.paths.loops.DENSE_ROWS", "paraflex.paths.reach.DENSE_ROWS"
 # Dense and sparse results differ by rounding errors, which long rows of loops multiply by up to a thousand.
 SAME = 1e-10
 

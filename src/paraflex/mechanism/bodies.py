@@ -113,11 +113,10 @@ class RigidBody(CheckedFields):
     _table = "body"
 
     name: str
-    mass: float = optional(0.0, "the mass in kg, which kinematics does without", not_negative, "kg")
+    mass: float = optional(0.0, "the mass in kg, which kinematics does without")
     inertia: float = optional(
-        0.0, "the moment of inertia about the centre of mass in kg m^2, which kinematics does without", not_negative,
-        "kg m^2",
-    )  # fmt: skip
+        0.0, "the moment of inertia about the centre of mass in kg m^2, which kinematics does without"
+    )
     centre_of_mass: tuple[float, float] = optional((0.0, 0.0), "[x, y] in the body frame in m", finite)
     points: Mapping[str, tuple[float, float]] = optional({}, "[x, y] of each named point in the body frame in m")
 

@@ -9,9 +9,10 @@ from paraflex.limits import ELEMENTS
 from .bodies import AssumedModesBeam, Body, ComponentModes, FlexibleBeam, RigidBody
 from .damping import stiffness_damping
 from .modal import ModalBody
-from .quantities import check_numbers, finite, known
+from .quantities import check_numbers, finite, known, positive
 
 T = TypeVar("T")
+_ROD = ' (a rod without mass between two pins is a joint of type = "distance")'
 
 
 def check_body(body: Body) -> None:
@@ -25,6 +26,10 @@ def check_body(body: Body) -> None:
     field = f"body.{body.name}"
     check_numbers(body, field)
     if isinstance(body, RigidBody):
+        # Both or none: kinematics does without.
+        if body.mass or body.inertia:
+            positive(body.mass, f"{field}.mass", f"kg{_ROD}")
+            positive(body.inertia, f"{field}.inertia", f"kg m^2{_ROD}")
         for name, position in body.points.items():
             finite(position, f"{field}.points.{name}")
         return

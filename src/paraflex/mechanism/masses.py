@@ -16,13 +16,12 @@ def check_masses(mechanism: Mechanism) -> None:
         A body has none.
     """
     for body in mechanism.bodies:
-        for name, unit in (("mass", "kg"), ("inertia", "kg m^2")):
-            if isinstance(body, RigidBody) and not getattr(body, name):
-                raise InputError(
-                    "is missing or zero, and forces depend on it", field=f"body.{body.name}.{name}",
-                    remedy=f"give it in {unit}; kinematics does without, and a rod without mass between two pins is a "
-                    'joint of type = "distance"',
-                )  # fmt: skip
+        if isinstance(body, RigidBody) and not body.mass:
+            raise InputError(
+                "is missing, and forces depend on it", field=f"body.{body.name}.mass",
+                remedy="give mass in kg and inertia in kg m^2; paraflex kinematics does without, and a rod without "
+                'mass between two pins is a joint of type = "distance"',
+            )  # fmt: skip
 
 
 def with_any_masses(mechanism: Mechanism) -> Mechanism:
