@@ -9,6 +9,7 @@ from paraflex.errors import InputError
 from paraflex.files import Model
 from paraflex.folders import RUN
 from paraflex.mechanism import Mechanism, finite_segments, proportional_segments
+from paraflex.mechanism.actuation_modes import following
 from paraflex.writing import portable_name
 from .along import run_along
 from .commands.requests import flagged
@@ -30,6 +31,8 @@ def run_command(request: RunRequest) -> int:
         check_stops(mechanism, options, request.stop_at)
         return run_motion(request, model, mechanism, options)
     paths, modes = find_paths(model, request.paths or model.study.paths), find_modes(model, request.modes)
+    if request.servo:
+        modes = list(dict.fromkeys([*modes, *map(following, modes)]))
     # All checks that need no computation come before the long runs.
     with ExitStack() as held:
         followed = {
@@ -56,8 +59,9 @@ def _folders(paths: Iterable[str], out: Path) -> dict[str, Path]:
 
 
 def _without_path(model: Model, request: RunRequest) -> Mechanism:
-    if request.ked:
-        raise InputError("the model has no path to prescribe", field="--ked", remedy="add a [path.NAME] table")
+    for flag, given in (("--ked", request.ked), ("--servo", request.servo)):
+        if given:
+            raise InputError("the model has no path to prescribe", field=flag, remedy="add a [path.NAME] table")
     mechanism = requested_mechanism(model, request)
     if request.segments is None:
         return mechanism
@@ -71,6 +75,8 @@ def _check_fidelity(request: RunRequest) -> None:
 
     Kineto-elastodynamics (KED) has its own fixed steps, hence no options on integration.
     """
+    if request.servo and request.ked:
+        raise conflict("has no effect with --ked, which holds motors on the rigid motion", "--servo", request.servo)
     chosen = {
         "--rigid": request.rigid,
         "--segments": request.segments is not None,

@@ -8,6 +8,7 @@ from paraflex.figures.loads import stress_table
 from paraflex.figures.reduction import reduced_runs_table, reduced_words
 from paraflex.figures.tracking import Runs, after_table, result_table
 from paraflex.findings import DONE_STATUSES
+from paraflex.mechanism.actuation_modes import SERVO
 from paraflex.results.findings import validity_line
 from paraflex.results.following import HEADLINE, ErrorSpan, below_tolerance_line
 from paraflex.results.loads import effort_lines, joint_line, stress_line
@@ -54,6 +55,8 @@ def print_runs(
     print_table(out, table, f"{task.mechanism.name}, {model}: {table.title}")
     ked = first["parameters"]["run"].get("ked")
     motors = "held all the time" if ked else "held by brakes" if task.holds else "free"
+    if any(name[-1].endswith(f" {SERVO}") for name in runs):
+        motors += ", of servo modes held on the plan"
     print_table(out, after_table(rows), f"Tracking error during the motion and after it, the motors {motors}")
     print_table(out, controller_table(runs, heads))
     for (*path, mode), one in runs.items():

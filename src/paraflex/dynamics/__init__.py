@@ -1,6 +1,6 @@
 """Equations of motion of a mechanism: its system of constant arrays, consistent states, equilibria, linearisation."""
 
-from .brake import BrakedSystem as BrakedSystem, brake as brake
+from .brake import BrakedSystem as BrakedSystem, brake as brake, held_joints as held_joints
 from .coordinates import (
     BodyCoordinates as BodyCoordinates,
     Marker as Marker,

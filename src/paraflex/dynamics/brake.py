@@ -1,10 +1,10 @@
 """Brakes: joints locked from an instant on, at the angle or travel they have at that instant."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from paraflex.arrays import Array
-from paraflex.mechanism import PrescribedAngle
+from paraflex.mechanism import PrescribedAngle, TimeProfile
 from paraflex.mechanism.profiles import HeldAngle
 from .following import driven_rows
 from .joint_coordinates import joint_value
@@ -67,11 +67,22 @@ def brake(system: System, state: State, joints: Sequence[str]) -> BrakedSystem:
     InconsistentConstraintsError
         A joint is moved by a prescribed motion.
     """
+    return held_joints(system, state, {joint: HeldAngle(joint_value(system, joint, state.q)) for joint in joints})
+
+
+def held_joints(system: System, state: State, profiles: Mapping[str, TimeProfile]) -> BrakedSystem:
+    """Hold joints on profiles in time from a state on: see `brake` for the change of velocities.
+
+    Parameters
+    ----------
+    system, state
+        See `brake`.
+    profiles : mapping of str to TimeProfile
+        Angle or travel of each joint over time, which at the state agrees with it.
+    """
     mechanism = system.mechanism
-    locks = tuple(
-        PrescribedAngle(f"brake of {joint}", joint, HeldAngle(joint_value(system, joint, state.q))) for joint in joints
-    )
-    locked = build_system(replace(mechanism, prescribed=(*mechanism.prescribed, *locks)), system)
+    holds = tuple(PrescribedAngle(f"brake of {joint}", joint, profile) for joint, profile in profiles.items())
+    locked = build_system(replace(mechanism, prescribed=(*mechanism.prescribed, *holds)), system)
     v = project_velocity(locked, moment_signals(locked.mechanism, state.time), state.time, state.q, state.v)
     lost = state.v - v
     energy = 0.5 * float(lost @ (sparse_mass(system, state.q) @ lost))

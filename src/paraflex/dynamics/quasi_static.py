@@ -245,13 +245,18 @@ def joint_motions(system: System, q: Array, v: Array, a: Array, joints: Iterable
     J is constant for angles; for travels J' v is computed by finite differences along the motion.
     """
     motions = {}
-    step = 1e-4 / max(1.0, float(np.max(np.abs(v), initial=0.0)))
-    places = np.array([q - step * v, q, q + step * v])
     for name in joints:
-        found = joint_coordinate(system, name, places, np.array([v, v, v]))
-        turning = (found.rate[2] - found.rate[0]) / (2.0 * step)
-        motions[name] = JointMotion(float(found.rate[1]), float(found.rows[1] @ a + turning))
+        _, rate, acceleration = joint_accelerations(system, name, q[None], v[None], a[None])
+        motions[name] = JointMotion(float(rate[0]), float(acceleration[0]))
     return motions
+
+
+def joint_accelerations(system: System, name: str, q: Array, v: Array, a: Array) -> tuple[Array, Array, Array]:
+    """Return value, rate and acceleration (k,) of a joint's coordinate in a motion q, v, a (k, n)."""
+    step = (1e-4 / np.maximum(1.0, np.max(np.abs(v), axis=1, initial=0.0)))[:, None]
+    before, here, after = (joint_coordinate(system, name, q + part * step * v, v) for part in (-1.0, 0.0, 1.0))
+    turning = (after.rate - before.rate) / (2.0 * step[:, 0])
+    return here.value, here.rate, np.sum(here.rows * a, axis=1) + turning
 
 
 def balanced_state(system: System, start: State, driven: Mapping[str, JointMotion]) -> State:

@@ -19,6 +19,7 @@ from paraflex.dynamics import System
 from paraflex.errors import InputError, IntegrationError, Moment
 from paraflex.interrupts import uninterrupted
 from paraflex.mechanism import ActuationMode, Body, FlexibleBeam, Joint, Mechanism, PointRef, TorsionalSpring
+from paraflex.mechanism.actuation_modes import check_torques
 from paraflex.results.drawing import Drawing, drawing, drawing_variables
 from paraflex.results.links import Links, point_variables, tip_variables
 from paraflex.results.numbers import single
@@ -107,6 +108,7 @@ def simulate_exudyn(task: TrackingTask, mode: str | ActuationMode, options: Exud
     check_engine("exudyn", task.mechanism)
     check_dwell("exudyn", task)
     torques = task.torques(mode)
+    check_torques(torques.mode, "Exudyn")
     substeps = steps_between(task.motion.t, options.step)
     begin = time.perf_counter()
     engine = _start_engine()

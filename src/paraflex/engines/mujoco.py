@@ -22,6 +22,7 @@ from paraflex.integrators import Solution
 from paraflex.kernel.bodies import weight_work
 from paraflex.kernel.packed import make_scratch
 from paraflex.mechanism import GROUND, ActuationMode, Joint, Mechanism, Relation, proportional_segments
+from paraflex.mechanism.actuation_modes import check_torques
 from paraflex.results.record import Record, record
 from paraflex.tracking import TrackingRun, TrackingTask
 from .common import check_dwell, check_engine, import_engine, steps_between
@@ -86,6 +87,7 @@ def simulate_mujoco(task: TrackingTask, mode: str | ActuationMode, options: MuJo
     began = time.perf_counter()
     task = task if task.whole is not None else task.in_segments(proportional_segments(task.mechanism, options.segments))
     torques = task.torques(mode)
+    check_torques(torques.mode, "MuJoCo")
     tree = spanning_tree(task.mechanism)
     count = steps_between(task.motion.t, options.step)
     model = _model(mujoco, task.system, tree, float(task.motion.t[1] - task.motion.t[0]) / count)

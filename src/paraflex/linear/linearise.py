@@ -19,6 +19,7 @@ from paraflex.dynamics.tangents import MotionPoint
 from paraflex.errors import InputError, as_enum
 from paraflex.limits import solvable
 from paraflex.mechanism import ActuationMode, Mechanism, PointRef, Sensor, Start, in_frames, parse_mode
+from paraflex.mechanism.actuation_modes import check_torques
 from paraflex.mechanism.checks import known_point
 from paraflex.mechanism.measured import measured_sensors
 from paraflex.motion import MotionRun
@@ -229,7 +230,9 @@ def mode_of(source: object, mechanism: Mechanism, mode: str | ActuationMode | No
         mode = source.mode
     if mode is None:
         return ActuationMode("all motors", tuple(motor.name for motor in mechanism.motors))
-    return mode if isinstance(mode, ActuationMode) else parse_mode(mechanism, mode)
+    mode = mode if isinstance(mode, ActuationMode) else parse_mode(mechanism, mode)
+    check_torques(mode, "a linear model")
+    return mode
 
 
 def ports_of(mechanism: Mechanism, mode: ActuationMode, forces: Sequence[str], prescribed: Sequence[str]) -> Ports:

@@ -1,6 +1,7 @@
 """Actuation modes, looked up by their names, signs or motors."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 from paraflex.arguments import checked_arguments
 from paraflex.errors import InputError
@@ -10,6 +11,9 @@ from .quantities import known
 
 # The paper prints circled signs; some keyboards and many PDFs have these in place of plain ASCII.
 _SIGNS = str.maketrans({"⊕": "+", "⊖": "-", "−": "-", "–": "-"})
+
+# Word behind a mode whose motors follow the planned motion.
+SERVO = "servo"
 
 
 @checked_arguments()
@@ -52,11 +56,37 @@ def mode_of_motors(mechanism: Mechanism, names: Sequence[str]) -> ActuationMode:
 
 @checked_arguments()
 def parse_mode(mechanism: Mechanism, text: str) -> ActuationMode:
-    """Return the actuation mode of a text: a name in the mechanism, signs ("+-+-"), or motor names ("tau1,tau5")."""
+    """Return the actuation mode of a text: a name in the mechanism, signs ("+-+-"), or motor names ("tau1,tau5").
+
+    With "servo" behind it, "+-+- servo", the active motors follow the planned motion exactly.
+    """
     for mode in mechanism.modes:
         if text == mode.name:
             return mode
+    plain, space, last = text.strip().rpartition(" ")
+    if space and last == SERVO:
+        return following(parse_mode(mechanism, plain))
     names = [part.strip() for part in text.split(",")]
     if all(name in {motor.name for motor in mechanism.motors} for name in names):
         return mode_of_motors(mechanism, names)
     return mode_of_signs(mechanism, text.strip())
+
+
+def following(mode: ActuationMode) -> ActuationMode:
+    """Return the mode of the same motors, which follow the planned motion."""
+    return mode if mode.follows else replace(mode, name=f"{mode.name} {SERVO}", follows=True)
+
+
+def check_torques(mode: ActuationMode, what: str) -> None:
+    """Check that the motors of a mode give torques, for what cannot hold them on the planned motion.
+
+    Raises
+    ------
+    InputError
+        The motors follow the planned motion.
+    """
+    if mode.follows:
+        raise InputError(
+            f"{what} needs given torques, and the motors of this mode follow the planned motion", field="mode",
+            value=mode.name, remedy=f'leave out "{SERVO}"',
+        )  # fmt: skip

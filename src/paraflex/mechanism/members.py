@@ -76,12 +76,24 @@ class Assembly(CheckedFields):
 
 @dataclass(frozen=True)
 class ActuationMode(CheckedFields):
-    """Named set of active motors; all other motors are passive and exert no torque."""
+    """Named set of active motors; all other motors are passive and exert no torque.
+
+    Attributes
+    ----------
+    name : str
+        Name of the mode.
+    motors : tuple of str
+        Active motors.
+    follows : bool
+        Whether active motors hold their joints on the planned motion, as ideal servo drives do, instead of giving the
+        planned torques.
+    """
 
     _table = "mode"
 
     name: str
     motors: tuple[str, ...]
+    follows: bool = False
 
 
 _MODE = 'a mode by its name, its signs such as "+-+-", or its motors such as "tau1,tau5"'

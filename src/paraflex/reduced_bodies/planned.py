@@ -44,6 +44,7 @@ from paraflex.integrators.run import jump_times
 from paraflex.kernel.bodies import motion_forces
 from paraflex.kernel.packed import make_scratch
 from paraflex.mechanism import ActuationMode
+from paraflex.mechanism.actuation_modes import check_torques
 from paraflex.tracking import TrackingTask, undeformed_at
 
 # Largest number of instants whose forces act in each pose.
@@ -96,6 +97,7 @@ class PlannedDeflections:
         ActuationError, SingularActuationError
             The mode cannot drive the mechanism along the path.
         """
+        check_torques(mode, "the choice of few coordinates")
         system, times, (q, v, a) = self.task.system, self.task.motion.t, self._motion
         torques, forces = self.task.torques(mode).evaluate(times), np.zeros_like(q)
         loads = acting_loads(system.mechanism, times)

@@ -68,6 +68,9 @@ class RunRequest:
         "Default: the study's, else all; 0 for all.",
     )
     segments: int | None = option("--segments N", "Cut beams into finite segments, N for the longest (the paper's: 8).")
+    servo: bool = switch(
+        "--servo", 'Also run each mode with its motors held on the planned motion; the same as --mode "MODE servo".'
+    )
     ked: bool = switch("--ked", "Kineto-elastodynamics: active motors held on the rigid motion.")
     balanced: bool = switch(
         "--balanced", "Start balanced, active motors held, or moving as drives prescribe; else undeformed."

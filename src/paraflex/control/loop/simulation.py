@@ -21,6 +21,7 @@ from paraflex.integrators import IntegrationOptions, Method, Solution, Treatment
 from paraflex.integrators.integration import Integration, IntegrationState
 from paraflex.kernel.sampled import SampledLaw
 from paraflex.mechanism import ActuationMode, Mechanism, Start, mode_of_motors, parse_mode
+from paraflex.mechanism.actuation_modes import check_torques
 from paraflex.mechanism.measured import encoders_of, measured_sensors
 from paraflex.mechanism.quantities import finite
 from paraflex.motion import motion_start
@@ -512,4 +513,6 @@ def _projecting(options: IntegrationOptions) -> IntegrationOptions:
 def _mode(mechanism: Mechanism, mode: str | ActuationMode | None) -> ActuationMode:
     if mode is None:
         return mode_of_motors(mechanism, [motor.name for motor in mechanism.motors])
-    return mode if isinstance(mode, ActuationMode) else parse_mode(mechanism, mode)
+    mode = mode if isinstance(mode, ActuationMode) else parse_mode(mechanism, mode)
+    check_torques(mode, "a sampled controller")
+    return mode

@@ -21,6 +21,7 @@ from paraflex.integrators.sensitivity import (
     run_derivatives,
 )
 from paraflex.integrators.solution import Solution
+from paraflex.mechanism.actuation_modes import check_torques
 from paraflex.results.run_traces import RunTraces, run_traces
 from paraflex.tracking import TrackingRun, simulate
 from .changes import Change, ModeChange
@@ -93,6 +94,8 @@ def mode_gradients(setting: Setting, task: Task, sizes: Sequence[float | None] |
             "derivatives do not go through the engagement of brakes", field="study.after", value=planned.after.value,
             remedy='write after = "free", or a duration that ends with the path',
         )  # fmt: skip
+    for mode in setting.modes:
+        check_torques(planned.mode(mode), "a derivative")
     sizes = [None] * len(setting.names) if sizes is None else sizes
     sizes = [size_of(setting, task, k, size) for k, size in enumerate(sizes)]
     changes = [Change(setting, task, planned, k, size) for k, size in enumerate(sizes)]
