@@ -28,7 +28,7 @@ from paraflex.units import DisplayUnit
 from .given import drawn
 from .labels import mathematics, plain
 from .layout import ONE_COLUMN, TWO_COLUMNS, figure_width, finish_plane, is_narrow, label_outer_time, lay_out, panels
-from .style import ink, journal_style, line_colours
+from .style import ink, journal_style, line_colours, shade
 
 # Height of a line in a list of names [mm].
 LIST_LINE = 5.5
@@ -108,8 +108,6 @@ _STOPPED: dict[str, Any] = {
     "linestyle": "none", "marker": "x", "markersize": 4.5, "markeredgewidth": 1.2, "zorder": 3.0,
     "label": "the run stopped",
 }  # fmt: skip
-# Opacity of the background of a span.
-_PALE = 0.08
 _LEVEL: dict[str, Any] = {"color": "0.5", "linestyle": (0, (5, 1.5)), "linewidth": 0.7, "zorder": 1.0}
 
 
@@ -309,9 +307,7 @@ def _draw(panel: Axes, cell: _Cell, time: Any, most: int, *, named: bool = True)
     for span in chart.spans:
         label = span.name if not is_narrow(figure_width(panel)) else span.name.replace("the desired", "the")
         low, high = units.x.factor * span.low, units.x.factor * span.high
-        panel.axvspan(
-            low, min(high, panel.get_xlim()[1]), color=ink(), alpha=_PALE, linewidth=0.0, zorder=0.0, label=label
-        )
+        panel.axvspan(low, min(high, panel.get_xlim()[1]), color=shade(), linewidth=0.0, zorder=0.0, label=label)
     if axis.names:
         list_lines(panel, [shortened(name) for name in axis.names] if named else [""] * len(axis.names))
         for line in range(len(axis.names) - 1 if _marks(chart) > 1 else 0):

@@ -3,11 +3,12 @@
 import shutil
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from io import StringIO
 from pathlib import Path
 from typing import Any, TextIO
 
 import matplotlib.style
-from matplotlib.colors import to_hex
+from matplotlib.colors import to_hex, to_rgb
 from matplotlib.figure import Figure
 from matplotlib.font_manager import FontProperties, fontManager
 
@@ -178,6 +179,12 @@ def line_colours() -> tuple[str, ...]:
     return COLOURS if cycle == matplotlib.rcParamsDefault["axes.prop_cycle"] else tuple(cycle.by_key()["color"])
 
 
+def shade() -> tuple[float, ...]:
+    """Return the colour behind a span of time: that of panels, mixed with 8 % of the ink."""
+    colours = (to_rgb(ink()), to_rgb(matplotlib.rcParams["axes.facecolor"]))
+    return tuple(0.08 * dark + 0.92 * pale for dark, pale in zip(*colours, strict=True))
+
+
 def check_latex(formats: Sequence[str]) -> None:
     """Check that LaTeX is installed if a format or the user's settings need it; raise InputError if it is not."""
     settings = matplotlib.rcParams
@@ -196,3 +203,10 @@ def write_figure(figure: Figure, file: Path | TextIO, format_name: str, dpi: flo
     """Write a figure in one of FIGURE_FORMATS; its bytes do not depend on the date."""
     with journal_style():
         figure.savefig(file, format=format_name, dpi="figure" if dpi is None else dpi, **_METADATA[format_name])
+
+
+def figure_svg(figure: Figure) -> str:
+    """Return a figure as the element of SVG for a page."""
+    svg = StringIO()
+    write_figure(figure, svg, "svg")
+    return svg.getvalue()[svg.getvalue().index("<svg") :]
