@@ -301,7 +301,14 @@ def test_a_slider_draws_and_gives_the_text_to_paste(page: Any, model: Path) -> N
     assert 'l1 = "250 mm"' in model.read_text(encoding="utf-8")
 
 
-def test_the_page_follows_the_file_and_keeps_the_last_drawing(page: Any, model: Path) -> None:
+SAME = """expected => {
+  const one = document.createElement("div");
+  one.innerHTML = expected;
+  return one.innerHTML === document.getElementById("drawing").innerHTML;
+}"""
+
+
+def test_the_page_follows_the_file_and_keeps_the_last_drawing(page: Any, server: WatchServer, model: Path) -> None:
     drag(page, "base", 0.12)
     right = model.read_text(encoding="utf-8")
     save(model, right.replace("[parameters]", "[parameters", 1))
@@ -311,6 +318,7 @@ def test_the_page_follows_the_file_and_keeps_the_last_drawing(page: Any, model: 
     page.wait_for_function("document.getElementById('sliders').textContent.includes('0.255')")
     page.wait_for_function("document.getElementById('error').textContent === ''")
     # A slider whose value has changed in the file is where the file is.
+    page.wait_for_function(SAME, arg=server.drawing([])["svg"])
     assert page.inner_text("label:nth-child(1)").split() == ["base", "0.11"]
     assert page.inner_text("#paste") == ""
 

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import io
 import re
 import stat
 import sys
+import warnings
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +20,7 @@ from matplotlib.colors import same_color
 import paraflex as pf
 from paraflex import plots
 from paraflex.plots.catalogue import CATALOGUE
-from paraflex.plots.style import BLUE, changed_settings
+from paraflex.plots.style import BLUE, changed_settings, write_figure
 from shell import paraflex
 from test_draw import RIDER, words
 
@@ -85,12 +87,15 @@ def test_settings_of_the_user_are_above_the_common_style_and_left_as_they_are(da
     assert axes.xaxis.get_gridlines()[0].get_visible()
 
 
-def test_a_layout_of_matplotlib_does_not_move_the_panels(data: xr.Dataset) -> None:
-    usual = plots.tracking_errors(data).axes[0].get_position().extents
-    with matplotlib.rc_context({"figure.constrained_layout.use": True}):
-        figure = plots.tracking_errors(data)
-        figure.canvas.draw()
-        assert figure.axes[0].get_position().extents == pytest.approx(usual)
+@pytest.mark.parametrize("layout", ["figure.constrained_layout.use", "figure.autolayout"])
+def test_a_layout_of_matplotlib_neither_moves_nor_warns(data: xr.Dataset, layout: Any) -> None:
+    for figure in (plots.tracking_errors, plots.mechanism_drawing):
+        usual = figure(data).axes[0].get_position().extents
+        with matplotlib.rc_context({layout: True}), warnings.catch_warnings():
+            warnings.simplefilter("error")
+            drawing = figure(data)
+            write_figure(drawing, io.StringIO(), "svg")
+        assert drawing.axes[0].get_position().extents == pytest.approx(usual)
 
 
 @pytest.mark.parametrize("setting", ["axes.titlesize", "axes.labelsize", "xtick.labelsize", "ytick.labelsize"])
