@@ -12,7 +12,7 @@ unexport PYTHONDONTWRITEBYTECODE
 .PHONY: run test lint types imports tests coverage docs wheel clean
 
 run: $(VENV)/.run
-	$(BIN)/paraflex run --out results
+	$(BIN)/paraflex run raparm_i --out results
 
 # Two at a time: checking types takes one core for a minute.
 test:

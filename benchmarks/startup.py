@@ -93,7 +93,7 @@ def first_run(wheel: str) -> Start:
         installed, out = os.path.join(folder, "installed"), os.path.join(folder, "out")
         with zipfile.ZipFile(wheel) as archive:
             archive.extractall(installed)
-        command = ["-m", "paraflex", "run", "--no-figures", "--out", out]
+        command = ["-m", "paraflex", "run", "raparm_i", "--no-figures", "--out", out]
         empty = os.path.join(folder, "empty")
         return timed("first run of a wheel", command, 1, PYTHONPATH=installed, NUMBA_CACHE_DIR=empty)
 

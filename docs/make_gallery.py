@@ -141,6 +141,21 @@ fonts are embedded in PDF as TrueType. Colours are those of Okabe and Ito, and l
 prints in grey and for colour-blind readers. Files are written to `figures/` in the folder of the results, or to
 `--output`. Existing files are replaced only with `--force`.
 
+This style is a base. Settings of Matplotlib that differ from its defaults have priority: those of a `matplotlibrc`, of
+`plt.rcParams` and of `matplotlib.style.use`. If only `font.size` is set, all sizes of charts follow it. The following
+options do the same for one command:
+
+- `--style ggplot` and `--style mine.mplstyle` choose a style of Matplotlib by its name or file. The option is
+  repeatable, also beside `single` or `double`; the last style has priority.
+- `--font STIXGeneral` chooses the family of fonts of text and symbols. Characters that it lacks are taken from DejaVu
+  Sans.
+- `--svg-text` writes text in SVG as text, which editors can change and which is shown in the viewer's fonts; by default
+  it is drawn as outlines. Matplotlib writes labels that contain symbols letter by letter.
+- `--format pgf` writes macros for `\\input` in a LaTeX document, whose fonts they use. LaTeX must be installed
+  (`pgf.texsystem`, by default `xelatex`), because it measures the text.
+
+Sizes of names in drawings of mechanisms and in films do not depend on these settings, nor do their colours.
+
 In Python, each figure is a function of `paraflex.plots` that takes results or their folder:
 
 ```python
@@ -150,6 +165,9 @@ data = pf.load_results("results/results.nc")
 pf.plots.tracking_errors(data).savefig("errors.pdf")
 pf.plots.link_motions(data, "++++").savefig("links.pdf")
 ```
+
+Settings apply while a figure is made, and while it is written: `with plt.rc_context({"font.family": "serif"}):` holds
+for what is within.
 
 The script `python docs/make_gallery.py` makes the figures of this page from small studies, and writes the page.
 References such as "Fig. 11" name the figure of the paper that has the same content.
@@ -210,7 +228,8 @@ def first_shown(kind: str) -> list[CatalogueFigure]:
 def entry(figure: CatalogueFigure) -> str:
     """Return a picture of the grid with its name, its caption and the function that draws it."""
     picture = f"images/gallery/{figure.name}.png"
-    caption = f"{figure.shows[0].upper()}{figure.shows[1:]}."
+    paper = f" (Fig. {figure.paper})" if figure.paper else ""
+    caption = f"{figure.shows[0].upper()}{figure.shows[1:]}{paper}."
     return (
         f'<figure id="{figure.name}" markdown>\n'
         f"[![{caption}]({picture})]({picture})\n\n"

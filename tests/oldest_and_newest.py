@@ -50,7 +50,7 @@ def tried(which: str, python: str, folder: Path) -> bool:
         ["-m", "pip", "list"],
         ["-m", "pip", "check"],
         ["-m", "paraflex.compilation"],
-        ["-m", "paraflex", "run", "--mode", "++++", "--out", str(folder / "results")],
+        ["-m", "paraflex", "run", "raparm_i", "--mode", "++++", "--out", str(folder / "results")],
         # Warnings of theirs are no errors here: old releases know nothing of the deprecations of others.
         ["-m", "pytest", "-q", "-W", "default", "-p", "no:cacheprovider", *tests],
     ]

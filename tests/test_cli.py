@@ -1,11 +1,12 @@
 """The command line as a user meets it: exit codes, one-line errors, files written, interrupted and repeated runs."""
 
 import json
+from pathlib import Path
 
 import numpy as np
 import pytest
 
-from paraflex.files import library_file
+from paraflex.files import library_file, library_names, load
 from paraflex.results import load_results
 from paraflex.studies.tracking import StudyResult
 from shell import interrupted, paraflex
@@ -16,7 +17,7 @@ FAST = ["--tol", "1e-3", "--duration", "0.1", "--samples", "51"]
 @pytest.fixture(scope="module")
 def results(tmp_path_factory):
     out = tmp_path_factory.mktemp("run") / "deep" / "results"
-    done = paraflex("run", "--mode", "++++", "--mode", "-+-+", *FAST, "--out", str(out))
+    done = paraflex("run", "raparm_i", "--mode", "++++", "--mode", "-+-+", *FAST, "--out", str(out))
     return done, out
 
 
@@ -81,7 +82,7 @@ def test_results_agree_with_the_summary(results):
 def test_runs_are_summarised_once(tmp_path, monkeypatch):
     made, make = [], StudyResult.to_dict
     monkeypatch.setattr(StudyResult, "to_dict", lambda result: made.append(make(result)) or made[-1])
-    done = paraflex("run", "--no-figures", "--no-report", "--mode", "++++", *FAST, "--out", str(tmp_path))
+    done = paraflex("run", "raparm_i", "--no-figures", "--no-report", "--mode", "++++", *FAST, "--out", str(tmp_path))
     assert done.returncode == 0, done.stderr
     assert len(made) == 1
     assert json.loads((tmp_path / "summary.json").read_text()).items() >= json.loads(json.dumps(made[0])).items()
@@ -89,14 +90,16 @@ def test_runs_are_summarised_once(tmp_path, monkeypatch):
 
 def test_second_run_gives_the_same_numbers(results, tmp_path):
     _, out = results
-    again = paraflex("run", "--no-figures", "--mode", "++++", *FAST, "--out", str(tmp_path), "--json")
+    again = paraflex("run", "raparm_i", "--no-figures", "--mode", "++++", *FAST, "--out", str(tmp_path), "--json")
     assert again.returncode == 0
     first, second = json.loads((out / "summary.json").read_text()), json.loads(again.stdout)
     assert first["modes"]["++++"]["tracking_rms"] == second["modes"]["++++"]["tracking_rms"]
 
 
 def test_json_is_all_that_is_on_stdout(tmp_path):
-    done = paraflex("run", "--no-figures", "--mode", "++++", "--rigid", *FAST, "--out", str(tmp_path), "--json")
+    done = paraflex(
+        "run", "raparm_i", "--no-figures", "--mode", "++++", "--rigid", *FAST, "--out", str(tmp_path), "--json"
+    )
     summary = json.loads(done.stdout)
     assert summary["modes"]["++++"]["tracking_rms"] < 1e-3
     assert summary["parameters"]["run"]["rigid"] is True
@@ -127,7 +130,8 @@ def test_json_is_all_that_is_on_stdout(tmp_path):
     ],
 )
 def test_bad_input_is_one_line_and_exit_code_2(tmp_path, arguments, says):
-    done = paraflex("run", *arguments, "--out", str(tmp_path / "out"), cwd=tmp_path)
+    model = [] if "--mechanism" in arguments else ["raparm_i"]
+    done = paraflex("run", *model, *arguments, "--out", str(tmp_path / "out"), cwd=tmp_path)
     assert done.returncode == 2
     assert says in done.stderr
     assert done.stderr.count("\n") == 1
@@ -135,9 +139,27 @@ def test_bad_input_is_one_line_and_exit_code_2(tmp_path, arguments, says):
     assert not list(tmp_path.rglob("summary*"))
 
 
+@pytest.mark.parametrize("options", [[], ["--rigid", "--out", "there"], ["--set", "link1.length=1"]])
+def test_run_without_a_model_says_what_can_be_run(tmp_path, options):
+    done = paraflex("run", *options, cwd=tmp_path)
+    assert done.returncode == 2
+    assert done.stdout == ""
+    lines = done.stderr.splitlines()
+    assert lines[0] == "error: no model is named; paraflex run NAME runs a mechanism of the library:"
+    told = dict(line.split(maxsplit=1) for line in lines if line.startswith("  "))
+    assert told == {name: load(name).mechanism.description for name in library_names()}
+    assert "four_bars:N" in lines[-2]
+    assert all(way in lines[-1] for way in ("paraflex run FILE.toml", "paraflex new NAME"))
+    assert not list(tmp_path.iterdir())
+
+
+def test_make_run_names_the_study():
+    assert "paraflex run raparm_i --out results\n" in (Path(__file__).parents[1] / "Makefile").read_text()
+
+
 def test_unwritable_folder(tmp_path):
     (tmp_path / "file").write_text("in the way")
-    done = paraflex("run", *FAST, "--out", str(tmp_path / "file" / "results"))
+    done = paraflex("run", "raparm_i", *FAST, "--out", str(tmp_path / "file" / "results"))
     assert done.returncode == 2
     assert "--out: cannot be written" in done.stderr
     assert "choose another folder" in done.stderr
@@ -158,7 +180,9 @@ def test_unreachable_path_names_file_time_and_place(tmp_path):
 
 
 def test_mode_that_cannot_drive_is_reported_and_the_others_go_on(tmp_path):
-    done = paraflex("run", "--no-figures", "--mode", "tau1", "--mode", "++++", *FAST, "--out", str(tmp_path), "--json")
+    done = paraflex(
+        "run", "raparm_i", "--no-figures", "--mode", "tau1", "--mode", "++++", *FAST, "--out", str(tmp_path), "--json"
+    )
     assert done.returncode == 1
     assert 'mode "+---" cannot drive the mechanism: 1 active motor for 2 degrees of freedom' in done.stderr
     modes = json.loads(done.stdout)["modes"]
@@ -168,7 +192,17 @@ def test_mode_that_cannot_drive_is_reported_and_the_others_go_on(tmp_path):
 
 def test_too_many_steps_keep_what_there_is(tmp_path):
     done = paraflex(
-        "run", "--no-figures", "--mode", "++++", *FAST, "--max-steps", "20", "--out", str(tmp_path), "--json"
+        "run",
+        "raparm_i",
+        "--no-figures",
+        "--mode",
+        "++++",
+        *FAST,
+        "--max-steps",
+        "20",
+        "--out",
+        str(tmp_path),
+        "--json",
     )
     assert done.returncode == 1
     assert 'mode "++++": the run has not ended after 20 steps, at t = ' in done.stderr
@@ -180,7 +214,7 @@ def test_too_many_steps_keep_what_there_is(tmp_path):
 
 def test_interrupt_keeps_what_there_is(tmp_path):
     # A tolerance that takes minutes.
-    assert "interrupted at t = " in interrupted("run", "--mode", "+-+-", "--tol", "1e-9", "--out", tmp_path)
+    assert "interrupted at t = " in interrupted("run", "raparm_i", "--mode", "+-+-", "--tol", "1e-9", "--out", tmp_path)
     data = load_results(tmp_path / "results.nc")
     assert data["status"].item() == "interrupted"
     assert data["end_effector"].notnull().any()

@@ -143,7 +143,20 @@ def test_a_motion_stopped_by_an_event_is_a_success(tmp_path):
 
 
 def test_a_study_stopped_by_an_event_is_a_success(tmp_path):
-    command = ["run", "--mode", "++++", "--tol", "1e-3", "--duration", "0.1", "--samples", "51", "--out", str(tmp_path)]
+    command = [
+        "run",
+        "raparm_i",
+        "--mode",
+        "++++",
+        "--tol",
+        "1e-3",
+        "--duration",
+        "0.1",
+        "--samples",
+        "51",
+        "--out",
+        str(tmp_path),
+    ]
     done = paraflex(*command, "--stop-at", "deflection:link1=1e-5", "--method", "tr-bdf2")
     assert done.returncode == 0, done.stderr
     assert 'mode "++++": the deflection of link1 reached its limit 1e-05 m at t = ' in done.stdout
@@ -160,15 +173,24 @@ def test_a_study_stopped_by_an_event_is_a_success(tmp_path):
 @pytest.mark.parametrize(
     ("arguments", "says"),
     [
-        (["run", "--ked", "--method", "newmark"], "--method: has no effect with --ked (got 'newmark')"),
-        (["run", "--ked", "--stop-at", "singular=0.1"], "--stop-at: has no effect with --ked (got 'singular=0.1')"),
-        (["run", "--stop-at", "joint:A9=0..1"], "--stop-at: unknown joint A9 (got 'joint:A9=0..1'); choose from A1"),
+        (["run", "raparm_i", "--ked", "--method", "newmark"], "--method: has no effect with --ked (got 'newmark')"),
         (
-            ["run", "--stop-at", "joint:A1=..80 mm"],
+            ["run", "raparm_i", "--ked", "--stop-at", "singular=0.1"],
+            "--stop-at: has no effect with --ked (got 'singular=0.1')",
+        ),
+        (
+            ["run", "raparm_i", "--stop-at", "joint:A9=0..1"],
+            "--stop-at: unknown joint A9 (got 'joint:A9=0..1'); choose from A1",
+        ),
+        (
+            ["run", "raparm_i", "--stop-at", "joint:A1=..80 mm"],
             "--stop-at: a quantity in m where one in rad is asked for (got 'joint:A1=..80 mm'); give it in rad",
         ),
-        (["run", "--rigid", "--stop-at", "deflection:link1=1"], "--stop-at: a rigid body does not bend"),
-        (["run", "--stop-at", "joint:A1=50.."], "--stop-at: the run would start outside the limits of joint A1"),
+        (["run", "raparm_i", "--rigid", "--stop-at", "deflection:link1=1"], "--stop-at: a rigid body does not bend"),
+        (
+            ["run", "raparm_i", "--stop-at", "joint:A1=50.."],
+            "--stop-at: the run would start outside the limits of joint A1",
+        ),
         (["run", "-m", "pendulum", "--stop-at", "joint:pivot=1.."], "--stop-at: the run would start outside"),
         (["verify", "--method", "trbdf2"], "--method: unknown method (got 'trbdf2')"),
     ],

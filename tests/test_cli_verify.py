@@ -92,7 +92,7 @@ def test_interrupt_keeps_the_models_that_are_done(tmp_path):
 )
 def test_run_at_other_fidelities(tmp_path, flag, extra, largest):
     fast = [part for part in FAST if flag == "--segments" or part not in ("--tol", "1e-3")]
-    done = paraflex("run", "--mode", "++++", flag, *extra, *fast, "--out", str(tmp_path), "--json")
+    done = paraflex("run", "raparm_i", "--mode", "++++", flag, *extra, *fast, "--out", str(tmp_path), "--json")
     assert done.returncode == 0, done.stderr
     summary = json.loads(done.stdout)
     assert 1e-6 < summary["modes"]["++++"]["tracking_rms"] < largest
@@ -113,7 +113,7 @@ def test_run_at_other_fidelities(tmp_path, flag, extra, largest):
     ],
 )
 def test_fidelities_exclude_one_another(tmp_path, arguments, says):
-    done = paraflex("run", *arguments, "--out", str(tmp_path / "out"), cwd=tmp_path)
+    done = paraflex("run", "raparm_i", *arguments, "--out", str(tmp_path / "out"), cwd=tmp_path)
     assert done.returncode == 2
     assert says in done.stderr
     assert list(tmp_path.iterdir()) == []

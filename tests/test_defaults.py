@@ -68,6 +68,7 @@ def test_frames_are_chosen_on_the_command_line(tmp_path):
         out = tmp_path / str(len(arguments))
         done = paraflex(
             "run",
+            "raparm_i",
             "--no-figures",
             "--mode",
             "++++",
@@ -89,7 +90,7 @@ def test_frames_are_chosen_on_the_command_line(tmp_path):
         (("--reference", "pined"), "--reference: unknown reference"),
         (("--rigid", "--curvature", "shared"), "--curvature: has no effect with --rigid"),
     ):
-        refused = paraflex("run", "--no-figures", "--out", str(tmp_path / "none"), *arguments)
+        refused = paraflex("run", "raparm_i", "--no-figures", "--out", str(tmp_path / "none"), *arguments)
         assert refused.returncode == 2
         assert says in refused.stderr
 

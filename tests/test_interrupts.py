@@ -201,7 +201,7 @@ def test_workers_end_with_a_parent_that_was_killed(study, tmp_path, engine):
 @pytest.mark.parametrize(("number", "code"), [*ENDING[:2], (signal.SIGKILL, -9)])
 def test_processes_that_compile_end_with_the_command(tmp_path, number, code):
     kernels = {"NUMBA_CACHE_DIR": str(tmp_path / "kernels")}
-    with started(*PARAFLEX, "run", "--out", tmp_path / "out", env=kernels) as child:
+    with started(*PARAFLEX, "run", "raparm_i", "--out", tmp_path / "out", env=kernels) as child:
         child.until(lambda: len(child.descendants()) >= 2)
         child.send(number, group=number != signal.SIGKILL)
         done = child.end()

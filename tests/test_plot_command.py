@@ -369,7 +369,7 @@ def test_the_command_draws_the_figures_of_points(results: Path, tmp_path: Path) 
 @pytest.mark.parametrize(
     ("words", "said"),
     [
-        (("--style", "triple"), "--style: unknown style"),
+        (("--style", "triple"), "--style: neither a width nor a style"),
         (("--format", "tiff"), "--format: unknown format"),
         (("--format", ","), "--format: unknown format"),
         (("--dpi", "0"), "--dpi"),

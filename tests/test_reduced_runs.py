@@ -296,7 +296,7 @@ def test_what_cannot_be_reduced_is_said_in_a_line(tmp_path, reduced_file, task, 
     assert refusal(tmp_path, "run", "five_bar", "--reduced", "53").endswith(
         "--reduced: no such number of flexible coordinates (got 53); from 1 to 52"
     )
-    assert "--reduced: has no effect with --rigid" in refusal(tmp_path, "run", "--rigid", "--reduced", "4")
+    assert "--reduced: has no effect with --rigid" in refusal(tmp_path, "run", "raparm_i", "--rigid", "--reduced", "4")
     assert "--reduced: has rigid bodies only" in refusal(tmp_path, "run", "slider_crank", "--reduced", "4")
     text = (reduced_file / "few.toml").read_text().replace("reduced = 10", "reduced = -1")
     (tmp_path / "bad.toml").write_text(text)
@@ -492,7 +492,9 @@ def test_wrong_ways_to_ask_for_as_few_as_the_tolerance_allows(tmp_path, task, fu
     assert "--reduced: no number of flexible coordinates (got 'few')" in refusal(
         tmp_path, "run", "five_bar", "--reduced", "few"
     )
-    assert "--reduced: has no effect with --rigid" in refusal(tmp_path, "run", "--rigid", "--reduced", "auto")
+    assert "--reduced: has no effect with --rigid" in refusal(
+        tmp_path, "run", "raparm_i", "--rigid", "--reduced", "auto"
+    )
     assert "--reduced: as few coordinates as the tolerance allows are chosen from a planned path" in refusal(
         tmp_path, "run", "slider_crank_flexible", "--reduced", "auto"
     )

@@ -395,7 +395,7 @@ def test_without_plotly_it_is_said(monkeypatch):
 @pytest.fixture(scope="module")
 def ran(tmp_path_factory):
     out = tmp_path_factory.mktemp("ran")
-    done = paraflex("run", "--no-figures", "--mode", "++++", "--mode", "tau1", *FAST, "--out", str(out))
+    done = paraflex("run", "raparm_i", "--no-figures", "--mode", "++++", "--mode", "tau1", *FAST, "--out", str(out))
     return done, out
 
 

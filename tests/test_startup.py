@@ -223,7 +223,7 @@ STUDY = """
 import sys
 from paraflex.__main__ import main
 out, *names = sys.argv[1:]
-sys.argv[1:] = ["run", "--mode", "++++", "--duration", "0.02", "--samples", "11", "--out", out]
+sys.argv[1:] = ["run", "raparm_i", "--mode", "++++", "--duration", "0.02", "--samples", "11", "--out", out]
 try:
     main()
 except SystemExit:

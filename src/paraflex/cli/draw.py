@@ -7,7 +7,6 @@ import sys
 import tempfile
 import webbrowser
 from html import escape
-from io import StringIO
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -18,11 +17,13 @@ from paraflex.equilibria.conditions import StaticsDefaults
 from paraflex.errors import InputError, listed
 from paraflex.files import Model
 from paraflex.mechanism import Mechanism
+from paraflex.plots.themes import theme
 from paraflex.results.acting import acting_load, drive_speed
 from paraflex.writing import portable_name, whole_file
 from .commands.models import DrawRequest
 from .replacing import refuse_existing
-from .request import requested_model
+from .request import conflict, requested_model
+from .signals import end_by_ctrl_c, exit_code
 from .tables import PlainConsole, framed_table
 
 if TYPE_CHECKING:
@@ -45,8 +46,10 @@ svg {{ width: 100%; height: auto; max-height: 92vh }} p.open {{ color: #c8102e }
 """
 
 
-def draw_command(request: DrawRequest) -> None:
-    """Draw the mechanism and print the name of the file."""
+def draw_command(request: DrawRequest) -> int | None:
+    """Draw the mechanism and print the name of the file, or watch its file; return the exit code of watching."""
+    if request.watch:
+        return _watch(request)
     output = None if request.output is None else Path(request.output)
     if output is not None:
         if output.suffix.lower() not in FORMATS:
@@ -62,23 +65,46 @@ def draw_command(request: DrawRequest) -> None:
 
     _write(model_drawing(shown, theme_name=request.theme), shown, output)
     _print_result(PlainConsole(), model, shown, request, output)
+    _open(output.resolve().as_uri(), request)
+    return None
+
+
+def _watch(request: DrawRequest) -> int:
+    """Draw the mechanism again whenever its file is saved, until a signal ends it; return the exit code."""
+    if request.output is not None:
+        raise conflict("has no effect with --watch, whose drawing is a page", "--output", request.output)
+    theme(request.theme)
+    if not Path(request.model.name).exists():
+        requested_model(request.model)
+    from .watch import WatchServer
+
+    end_by_ctrl_c()
+    with WatchServer(request) as server:
+        name = request.model.name
+        try:
+            PlainConsole().print_lines(f"{name} is drawn at {server.address} when it is saved; Ctrl-C ends this")
+            _open(server.address, request)
+            server.serve_forever()
+        except KeyboardInterrupt:
+            PlainConsole().print_lines(f"{name} is no longer watched")
+    return exit_code()
+
+
+def _open(address: str, request: DrawRequest) -> None:
     opens = (request.output is None and _has_screen()) if request.open is None else request.open
-    if opens and not webbrowser.open(output.resolve().as_uri()):
+    if opens and not webbrowser.open(address):
         PlainConsole(stderr=True).print_lines("no browser opens it here")
 
 
 def _write(figure: Figure, shown: Posed, output: Path) -> None:
     kind = output.suffix.lower()
-    from paraflex.plots.style import write_figure
+    from paraflex.plots.style import figure_svg, write_figure
 
     with whole_file(output, field=str(output.parent)) as unfinished:
         if kind == ".html":
-            svg = StringIO()
-            write_figure(figure, svg, "svg")
-            text = svg.getvalue()
             problems = "".join(f'<p class="open">{escape(problem)}</p>' for problem in shown.problems)
             name = escape(shown.mechanism.name)
-            page = _PAGE.format(name=name, problems=problems, svg=text[text.index("<svg") :])
+            page = _PAGE.format(name=name, problems=problems, svg=figure_svg(figure))
             unfinished.write_text(page, encoding="utf-8")
         else:
             write_figure(figure, unfinished, kind[1:], _DPI)

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import typer
 
-from paraflex.errors import InputError, suggestion
+from paraflex.errors import InputError
 from paraflex.plots.planned import drawings, figures_of, find_figure
 from paraflex.plots.sources import Source, open_source
 from .commands.results import PlotRequest
@@ -31,19 +31,23 @@ def plot_command(request: PlotRequest) -> None:
     drawn = [drawing for figure in chosen for drawing in drawings(source, figure, *requested)]
     # Matplotlib takes longer to import than everything up to here, so it is imported only now.
     from paraflex.plots.save import write_figures
+    from paraflex.plots.style import requested_style
 
     folder = source.folder / "figures" if request.output is None else Path(request.output)
     formats = [name.strip().lower() for name in request.format.split(",") if name.strip()]
-    written = write_figures(drawn, folder, formats, style=request.style, dpi=request.dpi, force=request.force)
+    width = next((name for name in request.styles if name in STYLES), None)
+    styles = [name for name in request.styles if name not in STYLES]
+    with requested_style(styles, request.font, svg_text=request.svg_text):
+        written = write_figures(drawn, folder, formats, style=width, dpi=request.dpi, force=request.force)
     for file in written:
         typer.echo(file)
 
 
 def _check(request: PlotRequest) -> None:
-    """Check the style and the resolution."""
-    if request.style is not None and request.style not in STYLES:
-        remedy = suggestion(request.style, STYLES)
-        raise InputError("unknown style", field="--style", value=request.style, remedy=remedy)
+    """Check the width and the resolution."""
+    widths = [name for name in request.styles if name in STYLES]
+    if len(widths) > 1:
+        raise InputError("more than one width", field="--style", value=" ".join(widths), remedy="name one of them")
     if not (math.isfinite(request.dpi) and 0.0 < request.dpi <= _DENSEST):
         remedy = f"give a number up to {_DENSEST:g}, such as 300"
         raise InputError("not a number of dots per inch", field="--dpi", value=request.dpi, remedy=remedy)

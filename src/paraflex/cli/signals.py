@@ -25,16 +25,26 @@ _IMPORTING, _OWNING = "<frozen importlib._bootstrap>", os.path.join("llvmlite", 
 
 
 class _Taken:
-    """Signal being handled: its number, and the monotonic times of the first one and of the last one raised [s]."""
+    """Signal being handled: its number, and the monotonic times of the first one and of the last one raised [s].
+
+    `usual` is set by a command that Ctrl-C ends as intended.
+    """
 
     number: int | None = None
+    usual: bool = False
     first: float = 0.0
     raised: float = 0.0
 
 
 def exit_code() -> int:
     """Return the exit code of an interrupted command: 130 after Ctrl-C, 143 after SIGTERM, 129 after SIGHUP."""
-    return 128 + (_Taken.number or signal.SIGINT)
+    number = _Taken.number or signal.SIGINT
+    return 0 if _Taken.usual and number == signal.SIGINT else 128 + number
+
+
+def end_by_ctrl_c() -> None:
+    """Make Ctrl-C the usual end of the command: its exit code is then that of success."""
+    _Taken.usual = True
 
 
 def is_taken() -> bool:
@@ -51,7 +61,7 @@ def leave_when_signalled() -> None:
 @contextmanager
 def raised() -> Iterator[None]:
     """Raise signals as KeyboardInterrupt in the main thread within the context."""
-    _Taken.number = None
+    _Taken.number, _Taken.usual = None, False
     if threading.current_thread() is not threading.main_thread():
         yield
         return

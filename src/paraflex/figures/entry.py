@@ -34,6 +34,8 @@ class Figure:
         Name of the function, of the plotting function in `paraflex.plots`, and stem of the files of `paraflex plot`.
     shows : str
         Description in one line.
+    paper : int
+        Number of the figure of the paper that shows the same of RAParM-I; 0 (default) if there is none.
     charts : callable
         Function that takes the results, and options by keyword, and returns the charts; None for a drawing, which is a
         function of `paraflex.plots`.
@@ -70,6 +72,7 @@ class Figure:
     name: str
     shows: str
     charts: Charts | None = None
+    paper: int = 0
     heading: str = ""
     takes: Takes = "results"
     written_as: str = ""

@@ -48,7 +48,7 @@ def link_deflections(data: xr.Dataset) -> Iterator[Chart]:
 
 
 @figure(
-    "axial and transverse displacement and slope of links' ends (Fig. 13)", heading=_LINKS, takes="mode",
+    "axial and transverse displacement and slope of links' ends", paper=13, heading=_LINKS, takes="mode",
     written_as="tip_deflections", written_with=("end_effector_desired",), panels="choices", height=34.0,
     variables=("tip_axial", "tip_slope"),
     defaults=lambda data: {"bodies": most_deflected(data)},
@@ -104,7 +104,7 @@ def most_deflected(data: xr.Dataset) -> list[str]:
 
 
 @figure(
-    "angle, speed and acceleration of links, desired and actual (Fig. 14)", heading=_LINKS, takes="mode",
+    "angle, speed and acceleration of links, desired and actual", paper=14, heading=_LINKS, takes="mode",
     written_as="link_motions", written_with=("angle_desired",), panels="choices", height=21.5,
 )  # fmt: skip
 def link_motions(data: xr.Dataset) -> Iterator[Chart]:

@@ -196,7 +196,7 @@ def tracking_distance(data: xr.Dataset) -> Iterator[Chart]:
     yield compared(chart, data, distance.where(distance > _NOTHING))
 
 
-@figure("desired and actual path, deviation magnified (Fig. 15)", heading=_FOLLOWING, takes="mode",
+@figure("desired and actual path, deviation magnified", paper=15, heading=_FOLLOWING, takes="mode",
         written_as="end_effector_path", points="point")  # fmt: skip
 def end_effector_path(
     data: xr.Dataset, magnification: float | None = None, point: str | None = None
@@ -241,7 +241,7 @@ def end_effector_path(
     yield Chart("path", "End-effector path", Axis("", "m", "y"), curves, Axis("", "m", "x"), equal=True)
 
 
-@figure("torque of every motor over time, one panel per mode (Fig. 12)", heading=_MOTORS, written_as="motor_torques",
+@figure("torque of every motor over time, one panel per mode", paper=12, heading=_MOTORS, written_as="motor_torques",
         panels="runs", columns=3, height=38.0, shared=True)  # fmt: skip
 def motor_torques(data: xr.Dataset) -> Iterator[Chart]:
     """Yield the chart of the torque of every motor over time (Fig. 12).
@@ -280,7 +280,7 @@ def actuation_condition(data: xr.Dataset) -> Iterator[Chart]:
     yield compared(chart, data.assign(end_effector=data["end_effector_desired"]), data["actuation_condition"])
 
 
-@figure("tracking error in x and y over time, one panel per mode (Fig. 18)", written_as="tracking_errors",
+@figure("tracking error in x and y over time, one panel per mode", paper=18, written_as="tracking_errors",
         panels="runs", columns=3, height=38.0)  # fmt: skip
 def tracking_errors(data: xr.Dataset) -> Iterator[Chart]:
     """Yield the chart of the tracking error of the end-effector in x and y, actual minus desired (Fig. 18).
@@ -321,7 +321,7 @@ def mode_comparison(data: xr.Dataset) -> Iterator[Chart]:
                 Axis(effort.name, effort.unit, effort.symbol, low=0.0))  # fmt: skip
 
 
-@figure("motion of the end-effector, desired and actual (Fig. 16)", takes="mode", written_as="end_effector_motion",
+@figure("motion of the end-effector, desired and actual", paper=16, takes="mode", written_as="end_effector_motion",
         points="point", panels="choices", height=33.0)  # fmt: skip
 def end_effector_motion(data: xr.Dataset, point: str | None = None) -> Iterator[Chart]:
     """Yield charts of displacement, velocity and acceleration of the end-effector in x and y (Fig. 16).
@@ -336,7 +336,7 @@ def end_effector_motion(data: xr.Dataset, point: str | None = None) -> Iterator[
         yield _of_directions(data, [name], point)
 
 
-@figure("phase diagrams of the end-effector (Fig. 17)", takes="mode", written_as="phase_diagrams", points="point",
+@figure("phase diagrams of the end-effector", paper=17, takes="mode", written_as="phase_diagrams", points="point",
         panels="choices", height=50.0)  # fmt: skip
 def phase_diagrams(data: xr.Dataset, point: str | None = None) -> Iterator[Chart]:
     """Yield charts of velocity over displacement and acceleration over velocity in x and y (Fig. 17).

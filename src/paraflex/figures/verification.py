@@ -58,7 +58,7 @@ def model_distances(data: xr.Dataset) -> Iterator[Chart]:
 
 
 @figure(
-    "path of the end-effector in two models (Fig. 23)", heading=_EFFECTOR, takes="models", written_as="compared_paths"
+    "path of the end-effector in two models", paper=23, heading=_EFFECTOR, takes="models", written_as="compared_paths"
 )
 def compared_paths(data: xr.Dataset, magnification: float | None = None) -> Iterator[Chart]:
     """Yield the chart of the end-effector's paths, with magnified deviations from the desired path.
@@ -82,7 +82,7 @@ def compared_paths(data: xr.Dataset, magnification: float | None = None) -> Iter
 
 
 @figure(
-    "angle and speed of links in two models (Fig. 22)", heading=_LINKS, takes="models", written_as="compared_links",
+    "angle and speed of links in two models", paper=22, heading=_LINKS, takes="models", written_as="compared_links",
     panels="choices", height=21.5,
 )  # fmt: skip
 def compared_links(data: xr.Dataset) -> Iterator[Chart]:

@@ -13,7 +13,7 @@ from paraflex.folders.kinds import RESULT_KINDS, ResultKind
 _DRAWINGS: Mapping[str, Figure] = {
     one.name: one
     for one in (
-        Figure("desired_path", "desired path and the mechanism at its start (Fig. 11)", written_as="desired_path"),
+        Figure("desired_path", "desired path and the mechanism at its start", paper=11, written_as="desired_path"),
         Figure(
             "mechanism_drawing",
             "the mechanism with its deflected links half way through the run",

@@ -28,7 +28,7 @@ from paraflex.units import DisplayUnit
 from .given import drawn
 from .labels import mathematics, plain
 from .layout import ONE_COLUMN, TWO_COLUMNS, figure_width, finish_plane, is_narrow, label_outer_time, lay_out, panels
-from .style import BLACK, COLOURS, SHADE, journal_style
+from .style import ink, journal_style, line_colours, shade
 
 # Height of a line in a list of names [mm].
 LIST_LINE = 5.5
@@ -103,9 +103,9 @@ _MANY, _SIZE, _SMALL, _FAINT, _SQUARE = 30, 4.0, 2.8, 2.4, 3.0
 _THINNEST, _MARK_LINE = 1.8, 2.6
 # Dashes by their numbers in a look.
 _DASHES: tuple[Any, ...] = ("-", (0, (5, 1.5)), (0, (1, 1)), (0, (5, 1.5, 1, 1.5)), (0, (9, 2)))
-_DESIRED: dict[str, Any] = {"color": BLACK, "linestyle": (0, (4, 2)), "linewidth": 0.8, "zorder": 2.5}
+_DESIRED: dict[str, Any] = {"linestyle": (0, (4, 2)), "linewidth": 0.8, "zorder": 2.5}
 _STOPPED: dict[str, Any] = {
-    "color": BLACK, "linestyle": "none", "marker": "x", "markersize": 4.5, "markeredgewidth": 1.2, "zorder": 3.0,
+    "linestyle": "none", "marker": "x", "markersize": 4.5, "markeredgewidth": 1.2, "zorder": 3.0,
     "label": "the run stopped",
 }  # fmt: skip
 _LEVEL: dict[str, Any] = {"color": "0.5", "linestyle": (0, (5, 1.5)), "linewidth": 0.7, "zorder": 1.0}
@@ -307,7 +307,7 @@ def _draw(panel: Axes, cell: _Cell, time: Any, most: int, *, named: bool = True)
     for span in chart.spans:
         label = span.name if not is_narrow(figure_width(panel)) else span.name.replace("the desired", "the")
         low, high = units.x.factor * span.low, units.x.factor * span.high
-        panel.axvspan(low, min(high, panel.get_xlim()[1]), color=SHADE, linewidth=0.0, zorder=0.0, label=label)
+        panel.axvspan(low, min(high, panel.get_xlim()[1]), color=shade(), linewidth=0.0, zorder=0.0, label=label)
     if axis.names:
         list_lines(panel, [shortened(name) for name in axis.names] if named else [""] * len(axis.names))
         for line in range(len(axis.names) - 1 if _marks(chart) > 1 else 0):
@@ -335,7 +335,8 @@ def _largest(curves: Sequence[Curve], most: int) -> tuple[list[Curve], str]:
 def _draw_curve(panel: Axes, curve: Curve, time: Any, x_unit: DisplayUnit, unit: DisplayUnit, *, single: bool) -> None:
     y = unit.factor * np.asarray(curve.y, dtype=float)
     x = time if curve.x is None else x_unit.factor * np.asarray(curve.x, dtype=float)
-    colour = BLACK if curve.look.colour is None else COLOURS[curve.look.colour % len(COLOURS)]
+    colours = line_colours()
+    colour = ink() if curve.look.colour is None else colours[curve.look.colour % len(colours)]
     label = mathematics(curve.name) if curve.name else None
     if curve.mark == "bar":
         panel.barh(y, x, height=curve.thickness, color=colour, linewidth=0.0, label=label)
@@ -350,12 +351,12 @@ def _draw_curve(panel: Axes, curve: Curve, time: Any, x_unit: DisplayUnit, unit:
                    markerfacecolor="white" if curve.mark == "ring" else colour, **pale)  # fmt: skip
         return
     if curve.desired and (single or curve.look.colour is None):
-        panel.plot(x, y, label=label, **_DESIRED)
+        panel.plot(x, y, label=label, color=ink(), **_DESIRED)
         return
     panel.plot(x, y, color=colour, linestyle=_DASHES[curve.look.dash], label=label)
     known = np.flatnonzero(np.isfinite(y))
     if curve.stopped and known.size:
-        panel.plot(x[known[-1]], y[known[-1]], **_STOPPED)
+        panel.plot(x[known[-1]], y[known[-1]], color=ink(), **_STOPPED)
 
 
 def _plane(cell: _Cell, time: Any, most: int) -> Figure:

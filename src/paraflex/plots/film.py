@@ -16,7 +16,7 @@ from pathlib import Path
 
 import numpy as np
 import xarray as xr
-from matplotlib import rc_context
+from matplotlib import rc_context, rcParams
 from matplotlib.artist import Artist
 from matplotlib.figure import Figure
 from PIL import GifImagePlugin, Image, ImageChops
@@ -84,7 +84,8 @@ def _animated_svg(film: Film) -> str:
     seconds = max(float(time[-1] - time[0]) / film.speed, 1e-3)
     count = min(time.size, _MOST_KEYS, round(seconds * _KEY_FRAMES) + 1)
     keys = np.unique(np.linspace(0, time.size - 1, count).round()).astype(int)
-    with journal_style(), rc_context({"svg.fonttype": "none", "font.family": ["DejaVu Sans", "sans-serif"]}):
+    with journal_style(), rc_context({"svg.fonttype": "none", "savefig.bbox": None}):
+        rcParams["font.family"] = [*rcParams["font.family"], "sans-serif"]
         figure, sketches, texts = stage(film)
         texts[-1].set_text(f"t = {number(time[0])} to {clock(time[-1], time[-1])[4:]}")
         still = _still_svg(figure, [artist for sketch in sketches for artist in sketch.artists])

@@ -21,7 +21,7 @@ from paraflex.figures.charts import TIME
 from paraflex.formatting import ROUNDING
 from paraflex.mechanism.quantities import known
 from .labels import mathematics
-from .style import STYLE
+from .style import STYLE, points
 
 ONE_COLUMN, TWO_COLUMNS = 84.0, 174.0  # Widths of a journal's columns [mm].
 COLUMNS = {"single": ONE_COLUMN, "double": TWO_COLUMNS}
@@ -34,7 +34,7 @@ _PAGE, _LOWEST = 225.0, 9.0
 _MARGIN, _FLATTEST, _TALLEST, _TALLEST_WIDE = 0.06, 0.3, 1.3, 0.75
 # Extent of a plane below which it is that of a point, as a share of the distance from the origin.
 _AT_REST = 1e-9
-# Room for the parts around a panel [mm].
+# Room for the parts around a panel [mm]; that of text is for the sizes of the common style.
 _EDGE = 1.0
 _LEGEND_LINE = 4.2
 _TITLE = 4.4
@@ -46,9 +46,8 @@ _RIGHT = 3.6  # half of a number such as 0.030
 
 # Widths of the characters of numbers in DejaVu Sans [em], and font size on the axes [mm].
 _DIGIT, _LETTERS = 0.636, {".": 0.318, "\N{MINUS SIGN}": 0.838, "+": 0.838}
-_EM = STYLE["ytick.labelsize"] / 72.0 * 25.4
-# Width of a letter of a title, and the excess by which a centred title may be wider than its panel [mm].
-_LETTER = 0.6 * STYLE["axes.titlesize"] / 72.0 * 25.4
+# Width of a letter of a title [em], and the excess by which a centred title may be wider than its panel [mm].
+_LETTER = 0.6
 _OVERHANG = 4.0
 
 _width: ContextVar[float | None] = ContextVar("_width", default=None)
@@ -123,8 +122,14 @@ def arranged(axes: NDArray[Any]) -> NDArray[Any]:
 
 
 def _title_fits(panel: Axes, width: float) -> bool:
-    lengths = [_LETTER * _letters(panel.get_title(loc=loc)) for loc in ("left", "center", "right")]
-    return lengths[1] <= width + _OVERHANG and lengths[0] + lengths[2] <= width - _LETTER
+    letter = _LETTER * points("axes.titlesize") / 72.0 * 25.4
+    lengths = [letter * _letters(panel.get_title(loc=loc)) for loc in ("left", "center", "right")]
+    return lengths[1] <= width + _OVERHANG and lengths[0] + lengths[2] <= width - letter
+
+
+def _room(of: float, setting: str) -> float:
+    """Return the room for a text whose room in the common style is `of`, in the size of the user's settings [mm]."""
+    return of * points(setting) / STYLE[setting]
 
 
 def _letters(text: str) -> int:
@@ -169,13 +174,13 @@ def lay_out(figure: Figure, axes: NDArray[Any], *, panel_height: float) -> Figur
             bottom = height - top - panel_height
             panel.set_position((left / width, bottom / height, panel_width / width, panel_height / height))
             panel.yaxis.set_label_coords(-room / panel_width, 0.5)
-            panel.xaxis.set_label_coords(0.5, -_TIME_NUMBERS / panel_height)
+            panel.xaxis.set_label_coords(0.5, -_room(_TIME_NUMBERS, "xtick.labelsize") / panel_height)
             # Accessing the ticks creates them in the current style.
             panel.xaxis.get_major_ticks()
             panel.yaxis.get_major_ticks()
             if panel_lines.get(panel):
                 titled = any(panel.get_title(loc=loc) for loc in ("left", "center"))
-                above = 1.0 + (_TITLE if titled else 0.5) / panel_height
+                above = 1.0 + (_room(_TITLE, "axes.titlesize") if titled else 0.5) / panel_height
                 panel.get_legend().set_bbox_to_anchor((0.5, above), transform=panel.transAxes)
     return figure
 
@@ -201,13 +206,15 @@ def _rows(
 ) -> tuple[list[float], float]:
     """Return the distances of the rows of panels from the figure's top edge, and the figure's height [mm]."""
     tops = []
-    y = _EDGE + (legend_lines * _LEGEND_LINE + _EDGE if legend_lines else 0.0)
+    line, title = _room(_LEGEND_LINE, "legend.fontsize"), _room(_TITLE, "axes.titlesize")
+    below = _room(_TIME_NUMBERS, "xtick.labelsize") + _room(_AXIS_LABEL, "axes.labelsize")
+    y = _EDGE + (legend_lines * line + _EDGE if legend_lines else 0.0)
     for row, lines in zip(axes, own_lines, strict=True):
-        y += lines * _LEGEND_LINE + 0.5 * _EDGE if lines else 0.0
-        y += _TITLE if any(panel.get_title(loc=loc) for panel in row for loc in ("left", "center")) else 0.0
+        y += lines * line + 0.5 * _EDGE if lines else 0.0
+        y += title if any(panel.get_title(loc=loc) for panel in row for loc in ("left", "center")) else 0.0
         tops.append(y)
         y += panel_height
-        y += _TIME_NUMBERS + _AXIS_LABEL if any(panel.get_xlabel() for panel in row) else _BELOW_ROW
+        y += below if any(panel.get_xlabel() for panel in row) else _BELOW_ROW
     return tops, y + _EDGE
 
 
@@ -215,7 +222,7 @@ def _columns(axes: NDArray[Any], width: float) -> tuple[list[float], list[float]
     """Return the left edges of the columns of panels, the room for numbers left of each, and a panel's width [mm]."""
     numbers = [_NUMBER_PAD + max(_number_width(panel.yaxis) for panel in column) for column in axes.T]
     margins = [
-        _EDGE + room + (_AXIS_LABEL if any(panel.get_ylabel() for panel in column) else 0.0)
+        _EDGE + room + (_room(_AXIS_LABEL, "axes.labelsize") if any(panel.get_ylabel() for panel in column) else 0.0)
         for column, room in zip(axes.T, numbers, strict=True)
     ]
     panel_width = width / len(margins) - _RIGHT - sum(margins) / len(margins)
@@ -229,7 +236,9 @@ def _number_width(axis: Axis) -> float:
     places = axis.get_majorticklocs()
     texts = axis.get_major_formatter().format_ticks(places.tolist())
     shown = [text for text, place in zip(texts, places, strict=True) if low <= place <= high]
-    return _EM * max((sum(_LETTERS.get(letter, _DIGIT) for letter in text) for text in shown), default=0.0)
+    plain = [re.sub(r"\\[a-z]+|[${}]", "", text) for text in shown]
+    em = points("ytick.labelsize") / 72.0 * 25.4
+    return em * max((sum(_LETTERS.get(letter, _DIGIT) for letter in text) for text in plain), default=0.0)
 
 
 def _entries(figure: Figure) -> tuple[dict[str, Any], dict[Axes, dict[str, Any]]]:

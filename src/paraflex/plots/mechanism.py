@@ -1,7 +1,6 @@
 """Sketch of a mechanism in one pose, from positions alone, and the desired path in the workspace (Fig. 11)."""
 
 from dataclasses import replace
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -13,17 +12,20 @@ from paraflex.arrays import Array
 from paraflex.errors import InputError
 from paraflex.figures.selection import names_of, samples
 from paraflex.figures.shapes import along, figure_of
-from paraflex.formatting import number
+from paraflex.formatting import number, text_symbol
 from paraflex.results.outlines import figure_order
 from .drawing import FOOT, HEAD, Sketch, bare, caption, draw_load_keys, draw_scale_bar
 from .given import drawn
-from .labels import plain, symbol
+from .labels import plain
 from .layout import MM, ONE_COLUMN, finish_plane, page_width, panels
-from .marks import still_marks
+from .marks import moving_marks, still_marks
+from .named import Name, place_names
 from .scene import DrawnJoint, Scene, default_magnification, limits_of, run_times, scene, select
-from .style import BLACK, BLUE
+from .style import BLACK, BLUE, points
 from .themes import theme
 
+# Largest number of joints that are named in a small drawing, and size of the names [pt].
+_MOST_NAMED, _TEXT = 24, 6.0
 _START: dict[str, Any] = {
     "color": BLACK, "linestyle": "none", "marker": "s", "markersize": 4.5, "zorder": 4.0, "label": "start",
 }  # fmt: skip
@@ -41,8 +43,10 @@ def desired_path(data: xr.Dataset) -> Figure:
     axes.plot(*path.T, color=BLUE, linewidth=1.3, zorder=2.6, label="desired path")
     _draw_direction(axes, path)
     axes.plot(*path[0], **_START)
-    draw_mechanism(axes, data, path)
-    return finish_plane(figure, axes)
+    names, taken = _draw_mechanism(axes, data)
+    finish_plane(figure, axes)
+    place_names(axes, names, [*taken, path], points("font.size"))
+    return figure
 
 
 @drawn
@@ -90,6 +94,9 @@ def mechanism_drawing(
     axes = bare(figure.add_axes((0.0, FOOT / height, 1.0, 1.0 - (HEAD + FOOT) / height)), limits)
     sketch = Sketch(axes, shown, limits, look, width=0.5)
     sketch.show(len(shown.time) - 1)
+    stations = dict(zip(names_of(run, "point"), run["point_station"].values.tolist(), strict=True))
+    followed = [name for name, station in stations.items() if station == shown.followed]
+    _name_marks(sketch, point or run.attrs.get("end_effector_point") or next(iter(followed), ""))
     draw_scale_bar(figure, sketch.limits, look, (0.98, 1.5 / height), 6.5)
     draw_load_keys(figure, shown, sketch.limits, look, (0.02, 2.5 / height), 6.5)
     title = [shown.mechanism, *([f"mode {plain(shown.mode)}"] if shown.mode else [])]
@@ -104,6 +111,20 @@ def mechanism_drawing(
         fontsize=7.0,
     )
     return figure
+
+
+def _name_marks(sketch: Sketch, followed: str) -> None:
+    """Write the names of joints, if there are few, and of the point whose trail is drawn, at the scene's last time."""
+    shown, look = sketch.scene, sketch.look
+    joints = [joint for joint in shown.joints if np.isfinite(joint.place[-1]).all()]
+    drawn = [figure_of(places[-1:])[0] for places in shown.bodies.values()]
+    drawn += [mark.places[-1] for mark in (*still_marks(shown, sketch.limits), *moving_marks(shown, sketch.limits))]
+    names = [Name(text_symbol(joint.name), joint.place[-1:], look.ink) for joint in joints]
+    names = names if len(names) <= _MOST_NAMED else []
+    if shown.trail is not None and np.isfinite(shown.trail[-1]).all():
+        names.insert(0, Name(followed, shown.trail[-1:], look.trail, bold=True))
+        drawn.append(shown.trail)
+    place_names(sketch.axes, names, drawn, _TEXT)
 
 
 def _draw_direction(axes: Axes, path: Array) -> None:
@@ -134,21 +155,14 @@ _WIDTH = 0.68
 _SAME = 1e-4
 
 
-def draw_mechanism(axes: Axes, data: xr.Dataset, clear_of: Array) -> None:
-    """Draw the start pose: every link, its joints, the points that do not move, and the points' names.
+def _draw_mechanism(axes: Axes, data: xr.Dataset) -> tuple[list[Name], list[Array]]:
+    """Draw the start pose: every link, its joints and the points that do not move; of the run with most samples.
 
-    Parameters
-    ----------
-    axes : matplotlib.axes.Axes
-        Axes in mm, with equal scales.
-    data : xarray.Dataset
-        Results from `paraflex.results`; the run with most samples is drawn.
-    clear_of : array (n, 2)
-        Points [mm] that names keep clear of, in addition to those of the mechanism.
+    Return the names of points, one for those that coincide, and the lines that names keep clear of (n, 2) [mm].
     """
     run = max((data.isel(mode=k) for k in range(data.sizes["mode"])), key=samples)
     if samples(run) == 0:
-        return
+        return [], []
     places = _MM * run["point_position"].transpose("time", "point", "axis").values[: samples(run)]
     names = names_of(run, "point")
     start, size = places[0], float(np.ptp(places[0], axis=0).max())
@@ -169,10 +183,13 @@ def draw_mechanism(axes: Axes, data: xr.Dataset, clear_of: Array) -> None:
     others = [group[0] for group in groups if group[0] not in joined]
     if others:
         axes.plot(*start[others].T, "o", label="other points", markersize=2.5, color=BLACK, zorder=3.0)
-    taken = np.vstack([*(_sampled(figure_of(places[:1])) for places in shown.bodies.values()), *grounds, clear_of])
-    taken = taken[np.isfinite(taken).all(axis=1)]
-    axes.update_datalim(np.vstack([start, taken]))
-    _name_points(axes, start, groups, names, taken)
+    marks = [mark.places[0] for mark in moving_marks(shown, shown.limits)]
+    taken = [*(figure_of(places[:1])[0] for places in shown.bodies.values()), *grounds, *marks]
+    everywhere = np.vstack([start, *taken])
+    axes.update_datalim(everywhere[np.isfinite(everywhere).all(axis=1)])
+    texts = [dict.fromkeys(text_symbol(names[k].rpartition(".")[2]) for k in group) for group in groups]
+    named = [Name(", ".join(text), start[group[:1]], BLACK) for text, group in zip(texts, groups, strict=True)]
+    return named, taken
 
 
 def _of_shapes(run: xr.Dataset) -> Scene:
@@ -193,12 +210,6 @@ def _scene(points: Array, names: list[str], joints: tuple[DrawnJoint, ...]) -> S
     )  # fmt: skip
 
 
-def _sampled(outline: Array) -> Array:
-    """Return closely spaced points along a line (1, s, 2)."""
-    share = np.linspace(0.0, 1.0, 25)[:, None]
-    return np.vstack([a + share * (b - a) for a, b in pairwise(outline[0])] + [outline[0, :1]])
-
-
 def _coincident(points: Array, size: float) -> list[list[int]]:
     """Return the indices of points, grouped by position."""
     groups: dict[int, list[int]] = {}
@@ -206,28 +217,3 @@ def _coincident(points: Array, size: float) -> list[list[int]]:
         first = int(np.argmax(np.linalg.norm(points - point, axis=1) <= _SAME * size))
         groups.setdefault(first, []).append(k)
     return list(groups.values())
-
-
-def _name_points(axes: Axes, points: Array, groups: list[list[int]], names: list[str], taken: Array) -> None:
-    """Write names beside points, each on the side with most room; coincident points share a text."""
-    size = float(np.ptp(points, axis=0).max())
-    angles = np.linspace(0.0, 2.0 * np.pi, 24, endpoint=False)
-    directions = np.column_stack([np.cos(angles), np.sin(angles)])
-    for group in groups:
-        point = points[group[0]]
-        texts = dict.fromkeys(symbol(names[k].rpartition(".")[2]) for k in group)
-        candidates = point + 0.055 * size * directions
-        room = np.linalg.norm(candidates[:, None] - taken[None], axis=2).min(axis=1)
-        best = int(np.argmax(room))
-        right, up = directions[best]
-        x, y = point + 0.025 * size * directions[best]
-        axes.text(
-            x,
-            y,
-            ", ".join(texts),
-            ha="left" if right > 0.4 else "right" if right < -0.4 else "center",
-            va="bottom" if up > 0.4 else "top" if up < -0.4 else "center",
-            zorder=3.5,
-        )
-        taken = np.vstack([taken, candidates[best]])
-        axes.update_datalim([(point + 0.08 * size * directions[best]).tolist()])

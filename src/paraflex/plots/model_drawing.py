@@ -12,7 +12,7 @@ from matplotlib.patches import FancyArrowPatch
 from paraflex.arrays import Array
 from paraflex.figures.shapes import along, figure_of
 from paraflex.formatting import number as number_text, printable
-from paraflex.mechanism import GROUND, Mechanism
+from paraflex.mechanism import GROUND, Mechanism, PointRef
 from paraflex.results.posed import Posed
 from .drawing import Sketch
 from .layout import MM, TWO_COLUMNS, page_width
@@ -29,7 +29,7 @@ _MM_OF_POINT = 25.4 / 72.0
 _LEFT, _RIGHT, _BELOW, _ABOVE = 13.0, 2.5, 15.5, 8.0
 _FLATTEST, _TALLEST = 0.36, 0.85
 # Largest numbers of members that are named: more names would hide the drawing.
-_MOST_BODIES, _MOST_JOINTS, _MOST_MOTORS, _MOST_SENSORS = 40, 60, 24, 40
+_MOST_BODIES, _MOST_JOINTS, _MOST_MOTORS, _MOST_SENSORS, _MOST_POINTS = 40, 60, 24, 40, 40
 _TEXT = 7.5
 # Length of the arrow of gravity as a share of the picture.
 _WEIGHT = 0.09
@@ -80,8 +80,11 @@ def model_drawing(posed: Posed, *, width: float = TWO_COLUMNS, theme_name: str =
             # The payload is above links and below the marks of joints and the end-effector.
             axes.plot(*posed.payload, **_PAYLOAD, **_payload_colours(look), zorder=3.05)
             drawn.append(posed.payload[None])
+        points = _named_points(posed, shown, limits)
+        axes.plot(*np.array([*points.values()]).reshape(-1, 2).T, "+", color=look.ink, markersize=4.0, zorder=3.06)
         named = _body_names(shown, look) + _joint_names(posed, shown, look) + _other_names(posed, shown, limits, look)
         named += _acting_names(acting, sensors, look)
+        named += [Name(name, place[None], look.earth) for name, place in points.items()]
         place_names(axes, named, drawn, _TEXT)
         if entries:
             columns = -(-len(entries) // rows)
@@ -267,6 +270,24 @@ def _other_names(posed: Posed, shown: Scene, limits: Limits, look: Theme) -> lis
     return [name for name in names if np.isfinite(name.places).all()]
 
 
+def _free_points(mechanism: Mechanism) -> list[PointRef]:
+    """Return the points of bodies at which no joint is."""
+    held = {str(ref) for joint in mechanism.joints for ref in (joint.a, joint.b)}
+    points = [PointRef(body.name, point) for body in mechanism.bodies for point in body.points]
+    return [ref for ref in points if str(ref) not in held]
+
+
+def _named_points(posed: Posed, shown: Scene, limits: Limits) -> dict[str, Array]:
+    """Return the positions (2,) of points of bodies that are away from joints and end-effector; none of too many."""
+    free = _free_points(posed.mechanism)
+    taken = [joint.place[0] for joint in shown.joints] + ([] if shown.trail is None else [shown.trail[0]])
+    places = {str(ref): posed.place(ref) for ref in free} if len(free) <= _MOST_POINTS else {}
+    return {
+        name: place for name, place in places.items()
+        if np.isfinite(place).all() and all(np.linalg.norm(place - at) > 1e-6 * limits.size for at in taken)
+    }  # fmt: skip
+
+
 def _acting_names(acting: Acting, sensors: list[SensorMark], look: Theme) -> list[Name]:
     """Return the names of loads, with their magnitudes, and of sensors."""
     loads = [Name(f"{one.name} {one.size}", one.named, look.trail) for one in acting.loads]
@@ -360,6 +381,7 @@ def _left_out(posed: Posed) -> str:
             ("bodies", len(posed.mechanism.bodies), _MOST_BODIES),
             ("joints", len(posed.mechanism.joints), _MOST_JOINTS),
             ("sensors", len(posed.mechanism.sensors), _MOST_SENSORS),
+            ("points", len(_free_points(posed.mechanism)), _MOST_POINTS),
         )
         if count > most
     ]

@@ -18,7 +18,7 @@ from paraflex.writing import portable_name, whole_file
 from .layout import column_width
 from .planned import PlannedFigure, drawings, figures_of
 from .sources import Source, kind_of_numbers
-from .style import FIGURE_FORMATS, write_figure
+from .style import FIGURE_FORMATS, check_latex, write_figure
 
 
 @checked_arguments()
@@ -115,9 +115,10 @@ def write_figures(
     Raises
     ------
     InputError
-        A format is unknown, or a file exists and `force` is False.
+        A format is unknown or needs LaTeX, which is missing, or a file exists and `force` is False.
     """
     all_known(formats or ("",), FIGURE_FORMATS, "--format", "format")
+    check_latex(formats)
     files = {drawing.stem: [folder / f"{portable_name(drawing.stem)}.{name}" for name in formats] for drawing in drawn}
     there = [file for each in files.values() for file in each if file.exists()]
     if there and not force:

@@ -42,6 +42,7 @@ class DrawRequest:
     open: bool | None = switch(
         "--open/--no-open", "Show it in a browser, or not. Default: without --output, at a screen.", default=None
     )
+    watch: bool = switch("--watch", "Draw on a page again whenever the file is saved; sliders for its [parameters].")
     force: bool = switch("--force", "Overwrite an existing file.")
 
 

@@ -77,8 +77,14 @@ class PlotRequest:
         "--point BODY.POINT",
         "Named point in place of the end-effector; repeatable. With all: in figures that show points.",
     )
-    style: str | None = option("--style single|double", "Width of one or two columns. Default: what suits each figure.")
-    format: str = option("--format pdf,svg,png", "One or several formats.", default="pdf")
+    styles: list[str] = repeatable(
+        "--style STYLE",
+        "single or double: width of one or two columns, by default what suits each figure; or a style of Matplotlib, "
+        "by name or file; repeatable.",
+    )
+    font: str | None = option("--font FAMILY", "Family of fonts. Default: DejaVu Sans, or that of the style.")
+    svg_text: bool = switch("--svg-text", "Text in SVG as text to edit, in fonts of the viewer; else as outlines.")
+    format: str = option("--format pdf,svg,png,pgf", "One or several formats; pgf needs LaTeX.", default="pdf")
     output: str | None = option("--output --out DIR", "Folder. Default: figures/ in RESULTS.")
     dpi: float = option("--dpi N", "Dots per inch of PNG.", default=300.0)
     force: bool = _overwrite()

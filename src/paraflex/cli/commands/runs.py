@@ -13,14 +13,23 @@ from .options import (
     replace_switch,
     tolerance_option,
 )
-from .requests import option, repeatable, switch
+from .requests import argument, option, repeatable, switch
+
+
+@dataclass(frozen=True)
+class RunChoice(ModelChoice):
+    """Choice of the model to run; there is no default."""
+
+    source: str | None = argument(
+        "NAME|FILE", "A library mechanism or a TOML file. Without one: list what can be run.", default=None
+    )
 
 
 @dataclass(frozen=True, kw_only=True)
 class RunRequest:
     """Options of `paraflex run`; None stands for the default of the model or the program."""
 
-    model: ModelChoice = field(default_factory=ModelChoice)
+    model: RunChoice = field(default_factory=RunChoice)
     paths: list[str] = repeatable(
         "--path NAME|FILE",
         "A path of the model or a TOML file with one; repeatable: each is run in all modes, into a folder of its name "
