@@ -17,6 +17,7 @@ from paraflex.equilibria.conditions import StaticsDefaults
 from paraflex.errors import InputError, listed
 from paraflex.files import Model
 from paraflex.mechanism import Mechanism
+from paraflex.mechanism.masses import with_any_masses
 from paraflex.plots.themes import theme
 from paraflex.results.acting import acting_load, drive_speed
 from paraflex.writing import portable_name, whole_file
@@ -135,7 +136,10 @@ def _print_result(console: PlainConsole, model: Model, shown: Posed, request: Dr
         console.print_lines(f"drawn as given, with open joints: {gaps}")
     name = request.model.name
     then = "run" if model.statics == StaticsDefaults() else "statics"
-    console.print_lines(f"drawn in {output}", f"next: paraflex info {name}, paraflex {then} {name}")
+    # Without masses only kinematics is possible.
+    massless = with_any_masses(mechanism) is not mechanism
+    more = f"paraflex kinematics {name}" if massless else f"paraflex info {name}, paraflex {then} {name}"
+    console.print_lines(f"drawn in {output}", f"next: {more}")
 
 
 def _drives(mechanism: Mechanism, shown: Posed) -> list[str]:
