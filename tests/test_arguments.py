@@ -13,7 +13,7 @@ import pytest
 import paraflex as pf
 import paraflex.dynamics
 import paraflex.mechanism
-import paraflex.report
+import paraflex.reports
 import paraflex.results
 import paraflex.studies
 from paraflex.arguments import checked_arguments
@@ -389,7 +389,7 @@ def given(tmp_path_factory):
     run, mrun = task.simulate("++++"), simulate_motion(pend, 0.05, samples=5)
     data = pf.tracking_dataset(run)
     pf.save_results(data, tmp / "results.nc")
-    public = [paraflex.mechanism, paraflex.dynamics, paraflex.results, paraflex.studies, paraflex.report]
+    public = [paraflex.mechanism, paraflex.dynamics, paraflex.results, paraflex.studies, paraflex.reports]
     names = {name: getattr(module, name) for module in public for name in dir(module) if not name.startswith("_")}
     functions = [simulate, simulate_ked, simulate_motion, export, result_tables]
     return names | {each.__name__: each for each in functions} | {

@@ -8,7 +8,7 @@ from typer.main import get_command
 import paraflex as pf
 from paraflex.cli import app as program
 from paraflex.errors import InputError
-from paraflex.report.provenance import command_line
+from paraflex.reports.provenance import command_line
 
 COMMANDS = program.all_commands(get_command(program.app))
 NEEDED = {"report": ["r"], "animate": ["r", "o"], "export": ["r"], "plot": ["r"], "new": ["n"]}

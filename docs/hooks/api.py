@@ -63,7 +63,7 @@ PACKAGES = (
     "plots",
     "plots.film",
     "plots.compare",
-    "report",
+    "reports",
     "results.metrics",
     "designs.setting",
     "designs.samples",

@@ -7,7 +7,7 @@ import xarray as xr
 
 from paraflex.errors import InputError
 from paraflex.folders import RESULT_KINDS
-from paraflex.report import Page, save_page
+from paraflex.reports import Page, save_page
 from paraflex.results.kinds import kind_of
 from paraflex.results.storage import open_results, results_file
 from .commands.results import ReportRequest
@@ -51,5 +51,5 @@ def page_of(data: xr.Dataset, folder: Path) -> Page:
     kind = RESULT_KINDS[kind_of(data)]
     kind.refuse("page", str(folder))
     module, _, function = (kind.page or "kind_page.kind_page").partition(".")
-    page = getattr(import_module(f"paraflex.report.{module}"), function)
+    page = getattr(import_module(f"paraflex.reports.{module}"), function)
     return page(data, folder) if kind.with_folder else page(data)

@@ -1,7 +1,7 @@
 """Description of a drawn mechanism, in metres: links, joints, ground, springs, loads and paths at given times.
 
 Scenes are drawn by Matplotlib (`plots/drawing.py`), as SVG (`plots/svg.py`) and by the player of reports
-(`report/film.py`).
+(`reports/film.py`).
 """
 
 from __future__ import annotations

@@ -360,4 +360,4 @@ def _script_json(data: Mapping[str, Any]) -> str:
 
 
 def _asset(name: str) -> str:
-    return (files("paraflex.report") / "assets" / name).read_text(encoding="utf-8")
+    return (files("paraflex.reports") / "assets" / name).read_text(encoding="utf-8")
