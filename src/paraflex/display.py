@@ -9,6 +9,7 @@ from collections.abc import Container, Iterable, Sequence
 from html import escape
 from typing import Any
 
+from .arrays import Brief
 from .formatting import number, typeset
 from .late import view
 
@@ -17,7 +18,7 @@ _MOST_LISTED = 60
 _RULE = "1px solid rgba(128, 128, 128, 0.45)"
 
 
-class Shown:
+class Shown(Brief):
     """Base class of objects with a view in notebooks."""
 
     def _repr_html_(self) -> str:

@@ -19,7 +19,7 @@ from .actuation import (
     required_effort,
 )
 from .arguments import checked_arguments, named_in_errors
-from .arrays import Array
+from .arrays import Array, Brief
 from .display import Shown
 from .dynamics import (
     State,
@@ -64,7 +64,7 @@ class Ending(Enum):
 
 @named_in_errors("a task", "the task that plan_tracking makes")
 @dataclass(frozen=True)
-class TrackingTask:
+class TrackingTask(Brief):
     """Mechanism, path, and rigid motion along it: the common part of the runs of all modes.
 
     Attributes

@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from paraflex.arguments import checked_arguments
-from paraflex.arrays import Array, Indices, Mask
+from paraflex.arrays import Array, Brief, Indices, Mask
 from paraflex.dynamics import (
     System,
     assembled_position,
@@ -52,7 +52,7 @@ _OTHER = "it can be reached, but only past a Type I singularity or in another as
 
 
 @dataclass(frozen=True)
-class RigidMotion:
+class RigidMotion(Brief):
     """Motion of the rigid mechanism along a path.
 
     Attributes

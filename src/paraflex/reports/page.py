@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from paraflex.arguments import checked_arguments, named_in_errors
-from paraflex.arrays import ArrayLike
+from paraflex.arrays import ArrayLike, Brief
 from paraflex.errors import InputError
 from paraflex.figures.charts import (
     Array,
@@ -48,7 +48,7 @@ _SCRIPTS = ("report.js", "designs.js", "charts.js", "player.js", "start.js")
 
 @named_in_errors("a page", "what tracking_page or motion_page returns")
 @dataclass(frozen=True)
-class Page:
+class Page(Brief):
     """Content of a report.
 
     Attributes
