@@ -174,6 +174,7 @@ from .results import (
 )
 from .results.export import export as export
 from .plots.film import FilmOptions as FilmOptions, animate as animate
+from .studies.report import report as report
 
 # Errors and warnings
 from .errors import (

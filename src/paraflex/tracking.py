@@ -20,7 +20,7 @@ from .actuation import (
 )
 from .arguments import checked_arguments, named_in_errors
 from .arrays import Array, Brief
-from .display import Shown
+from .display import Played
 from .dynamics import (
     State,
     System,
@@ -208,7 +208,7 @@ class TrackingTask(Brief):
 
 @named_in_errors("a run along a path", "a run that simulate returns")
 @dataclass(frozen=True)
-class TrackingRun(Shown):
+class TrackingRun(Played):
     """Run of one mode of a task.
 
     Attributes

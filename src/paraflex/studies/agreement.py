@@ -12,6 +12,7 @@ import xarray as xr
 from paraflex.arguments import checked_arguments, named_in_errors
 from paraflex.arrays import Array
 from paraflex.campaign import Result
+from paraflex.display import Played
 from paraflex.errors import as_enum
 from paraflex.findings import Verdict
 from paraflex.folders import VERIFICATION
@@ -61,7 +62,7 @@ class ModelRuns:
 
 @named_in_errors("a verification", "what verify returns")
 @dataclass(frozen=True)
-class Verification(Result):
+class Verification(Result, Played):
     """Runs of all models in all modes.
 
     Attributes
