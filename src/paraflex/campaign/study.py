@@ -14,6 +14,7 @@ from typing import Any, ClassVar, Generic, TypeVar
 import xarray as xr
 
 from paraflex.arguments import CheckedFields
+from paraflex.arrays import Brief
 from paraflex.display import Shown
 from paraflex.errors import InputError
 from paraflex.folders import STUDY_OF_RUNS, ResultsFolder, hold_folder
@@ -189,7 +190,7 @@ class KeptResult(Result):
 R_co = TypeVar("R_co", bound=Result, covariant=True)
 
 
-class Study(ABC, Generic[R_co]):
+class Study(Brief, ABC, Generic[R_co]):
     """Base class of studies, which are read from a file or built in Python."""
 
     @abstractmethod

@@ -10,7 +10,7 @@ import numpy as np
 import xarray as xr
 
 from paraflex.arguments import checked_arguments, named_in_errors
-from paraflex.arrays import Array
+from paraflex.arrays import Array, Brief
 from paraflex.campaign import Result
 from paraflex.display import Played
 from paraflex.errors import as_enum
@@ -35,7 +35,7 @@ class Refinement(Enum):
 
 
 @dataclass(frozen=True)
-class ModelRuns:
+class ModelRuns(Brief):
     """Results of one model in one mode.
 
     Attributes
