@@ -139,7 +139,7 @@ from .control.environment import Environment as Environment
 from .control.vector_environment import VectorEnvironment as VectorEnvironment
 
 # Studies
-from .campaign import Workers as Workers
+from .campaign import Workers as Workers, progress_bar as progress_bar
 from .studies import (
     run_study as run_study,
     verify as verify,

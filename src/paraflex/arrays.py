@@ -30,7 +30,7 @@ class Brief:
         super().__init_subclass__(**options)
         # A dataclass keeps the representation that it finds in its class.
         if "__repr__" not in vars(cls):
-            cls.__repr__ = brief
+            cls.__repr__ = brief  # pyright: ignore[reportAttributeAccessIssue]
 
 
 @recursive_repr()
@@ -43,19 +43,17 @@ def brief(record: Any) -> str:
 
 
 def whole(value: Any) -> str:
-    """Return a representation in which dataclasses, also those in collections, have all their values."""
-    if is_dataclass(value) and not isinstance(value, type):
-        return f"{type(value).__qualname__}({', '.join(f'{name}={whole(each)}' for name, each in _values(value))})"
-    if isinstance(value, Mapping):
-        value = tuple(value.items())
+    """Return a text with all values of dataclasses, also of those in collections."""
+    if is_dataclass(value):
+        value = [type(value).__qualname__, *_values(value)]
+    elif isinstance(value, Mapping):
+        value = list(value.items())
     return f"({', '.join(map(whole, value))})" if isinstance(value, tuple | list) else repr(value)
 
 
 def _values(record: Any) -> list[tuple[str, Any]]:
-    names = getattr(record, "_fields", ())
-    if is_dataclass(record):
-        names = [each.name for each in fields(record) if each.repr]
-    return [(name, getattr(record, name)) for name in names]
+    shown = [each.name for each in fields(record) if each.repr] if is_dataclass(record) else ()
+    return [(name, getattr(record, name)) for name in shown or getattr(record, "_fields", ())]
 
 
 def _in_full(value: Any) -> str:
@@ -66,7 +64,6 @@ def _in_full(value: Any) -> str:
 
 
 def _abbreviated(value: Any, text: str) -> str:
-    """Return a representation of a value that is short if that in full, `text`, is not."""
     if len(text) <= _VALUE:
         return text
     if isinstance(value, str):
@@ -75,4 +72,4 @@ def _abbreviated(value: Any, text: str) -> str:
         kinds = {type(each).__name__ for each in (value.values() if isinstance(value, Mapping) else value)}
         return f"<{len(value)} {kinds.pop() if len(kinds) == 1 else 'values'}>"
     name = getattr(value, "name", "")
-    return f"{type(value).__name__}({name!r})" if isinstance(name, str) and name else f"{type(value).__name__}(...)"
+    return f"{type(value).__name__}({repr(name) if isinstance(name, str) and name else '...'})"

@@ -121,22 +121,18 @@ def check_of_statics(given: Collection[str]) -> None:
 def study_table(kind: type[T], file: StudyFile) -> Iterator[tuple[T, Path]]:
     """Provide the contents of a study file and its folder; input errors raised in the context name the file.
 
-    A study that is given by its contents has the current folder.
-
     Parameters
     ----------
     kind : type
         Schema of the file.
     file : str, Path or mapping
-        Study file, or its contents, in which the mechanism may be a model or a mechanism.
+        Study file; or its contents, whose mechanism may be an object, and whose folder is the current one.
 
     Raises
     ------
     InputError
         The file cannot be read, or a field does not fit.
     """
-    if isinstance(file, Mapping):
-        yield validate(kind, plain(file), ""), Path()
-        return
-    with naming(str(file)):
-        yield validate(kind, read_toml(Path(file)), str(file)), Path(file).parent
+    source, folder = ("", Path()) if isinstance(file, Mapping) else (str(file), Path(file).parent)
+    with naming(source):
+        yield validate(kind, plain(file) if isinstance(file, Mapping) else read_toml(Path(file)), source), folder

@@ -19,7 +19,7 @@ import numpy as np
 import scipy
 from scipy.sparse import csr_matrix
 
-from paraflex.arrays import Array, Indices, brief
+from paraflex.arrays import Array, Indices
 from paraflex.kernel.packed import FRICTION, INDEX_1, SPRING
 from paraflex.kernel.tangent import make_tangent, note_slopes
 from paraflex.kernel.tangent_columns import ACCELERATION, COORDINATE, VELOCITY, tangent_columns
@@ -52,7 +52,6 @@ class MotionPoint(NamedTuple):
     a: Array
     multipliers: Array
     torques: Array
-    __repr__ = brief
 
     @property
     def at_rest(self) -> bool:
@@ -92,7 +91,6 @@ class Tangents(NamedTuple):
     compliant: Indices
     compliant_place: csr_matrix
     compliant_rate: csr_matrix
-    __repr__ = brief
 
 
 class _Pattern(NamedTuple):

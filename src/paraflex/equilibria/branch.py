@@ -14,7 +14,7 @@ import numpy as np
 import scipy
 from scipy.sparse import csr_matrix
 
-from paraflex.arrays import Array, brief
+from paraflex.arrays import Array
 from paraflex.dynamics.sparse import solved
 from paraflex.errors import EquilibriumError, LimitPointError
 from .equations import Equations, Unknowns
@@ -60,7 +60,6 @@ class Point(NamedTuple):
     at: Unknowns
     tangent: Unknowns
     limit: bool = False
-    __repr__ = brief
 
 
 class _NewtonFailure(Exception):

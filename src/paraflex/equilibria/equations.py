@@ -20,7 +20,7 @@ import numpy as np
 import scipy
 from scipy.sparse import csr_matrix
 
-from paraflex.arrays import Array, Brief, Indices, brief
+from paraflex.arrays import Array, Brief, Indices
 from paraflex.dynamics import State, System, acting_loads
 from paraflex.dynamics.constraints import coordinate_kind
 from paraflex.dynamics.sparse import Saddle, stiffness_diagonal, without_stiffness
@@ -41,7 +41,6 @@ class Unknowns(NamedTuple):
     q: Array
     mu: Array
     s: float
-    __repr__ = brief
 
     def plus(self, change: Unknowns, part: float = 1.0) -> Unknowns:
         """Add a multiple of a change."""

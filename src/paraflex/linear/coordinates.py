@@ -18,7 +18,7 @@ import numpy as np
 import scipy
 from scipy.sparse import csr_matrix
 
-from paraflex.arrays import Array, Brief, Indices, brief
+from paraflex.arrays import Array, Brief, Indices
 from paraflex.dynamics import System, joint_coordinate, material_angle
 from paraflex.dynamics.constraints import coordinate_kind
 from paraflex.dynamics.points import marker_place
@@ -103,7 +103,6 @@ class PointTangents(NamedTuple):
     joints: RowTangents
     compliant: Indices
     motors: csr_matrix
-    __repr__ = brief
 
 
 class RowTangents(NamedTuple):

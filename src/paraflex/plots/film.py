@@ -7,12 +7,11 @@ import re
 import shutil
 import subprocess
 import tempfile
-from base64 import b64encode
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from html import escape
-from io import BytesIO, StringIO
+from io import StringIO
 from pathlib import Path
 from typing import Any
 
@@ -47,11 +46,8 @@ _TRAILER = b";"
 _KEY_FRAMES, _MOST_KEYS = 25.0, 400
 
 
-def write_film(film: Film, kind: str, file: Any, report: Report) -> None:
-    """Write a film of a kind that `film_kind` returns, for a sequence of pictures into an existing folder.
-
-    A single picture is also written into an open file.
-    """
+def write_film(film: Film, kind: str, file: Path, report: Report) -> None:
+    """Write a film of a kind that `film_kind` returns; for a sequence of pictures, `file` is an existing folder."""
     if kind == ".svg":
         file.write_text(_animated_svg(film), encoding="utf-8")
         report(len(film.time), len(film.time))
@@ -360,13 +356,9 @@ def animate(
 
 
 @view.register(Film)
-def film_html(film: Film) -> str:
-    """Return the view of a film: an animated SVG, or the single picture."""
-    if film.plays:
-        return _animated_svg(film)
-    picture = BytesIO()
-    write_film(film, ".png", picture, lambda done, total: None)
-    return f'<img src="data:image/png;base64,{b64encode(picture.getvalue()).decode()}">'
+def film_html(film: Film) -> str | None:
+    """Return the view of a film, an animated SVG; None for a single picture, of which notebooks show the text."""
+    return _animated_svg(film) if film.plays else None
 
 
 played.register(object)(animate)

@@ -1,4 +1,4 @@
-"""Dataset of results that are given as they come: runs, results of studies, linear models, equilibria, folders."""
+"""Dataset of results as they come: runs, linear models, equilibria, results of studies, folders."""
 
 from pathlib import Path
 from typing import Any
@@ -16,35 +16,29 @@ from .motion_data import motion_dataset
 from .statics_data import statics_dataset
 from .storage import open_results
 
+_OF_ONE = {MotionRun: motion_dataset, Statics: statics_dataset}
+_OF_SEVERAL = {TrackingRun: tracking_dataset, LinearModel: linear_dataset}
 _GIVE = "give a run, the result of a study, a dataset, or the folder of results"
 
 
-def dataset_of(results: Any, field: str = "results") -> xr.Dataset:
-    """Return the dataset of results.
-
-    Parameters
-    ----------
-    results : Any
-        Run, or several runs of one task in different modes; linear model, or several; equilibria; result of a study; or
-        a folder or file of results. A dataset is returned unchanged.
-    field : str
-        Name of the argument, for errors.
+def dataset_of(results: Any, field: str) -> xr.Dataset:
+    """Return the dataset of a run, of runs or linear models in several modes, of equilibria, a study, or a folder.
 
     Raises
     ------
     InputError
-        No results, or a study of which nothing ran.
+        No results, or a study of which nothing ran; the error names the field.
     """
     if isinstance(results, str | Path):
         return open_results(results)
     data = results if isinstance(results, xr.Dataset | list | tuple) else getattr(results, "data", results)
     if isinstance(data, xr.Dataset):
         return data
-    for kind, make in ((MotionRun, motion_dataset), (Statics, statics_dataset)):
+    several = data if isinstance(data, list | tuple) else [data]
+    for kind, make in _OF_ONE.items():
         if isinstance(data, kind):
             return make(data)
-    several = data if isinstance(data, list | tuple) else [data]
-    for kind, make in ((TrackingRun, tracking_dataset), (LinearModel, linear_dataset)):
+    for kind, make in _OF_SEVERAL.items():
         if several and all(isinstance(each, kind) for each in several):
             return make(several)
     raise refused(results, field, "results of runs", _GIVE)

@@ -17,20 +17,14 @@ from .tracking import StudyResult
 
 @checked_arguments()
 def report(results: Any, *, on_progress: Callable[[str], None] | None = None) -> Page:
-    """Return the report of results: a page with tables, interactive charts and the mechanism in motion.
+    """Return the report of results, a page that notebooks show and that its method `save` writes.
 
     Parameters
     ----------
     results : Any
-        Run, or list of runs of one task; result of a study; dataset; linear model; equilibria; or a folder or file of
-        results.
+        Run, or runs of one task; result of a study; dataset; linear model; equilibria; or folder or file of results.
     on_progress : callable, optional
-        Function called with a short description of what takes time: the best designs of a study are simulated again.
-
-    Returns
-    -------
-    Page
-        Page that notebooks show; its method `save` writes it as a file.
+        Function called with a description of what takes time: the best designs of a study are simulated again.
 
     Raises
     ------
@@ -42,9 +36,8 @@ def report(results: Any, *, on_progress: Callable[[str], None] | None = None) ->
         study = study_of(Path(results))
         if study is not None:
             return study_page(study, on_progress)
-        file = results_file(results)
-        return page_of(open_results(file), file.parent)
-    data = dataset_of(results)
+        return page_of(open_results(results), results_file(results).parent)
+    data = dataset_of(results, "results")
     if isinstance(results, Verification):
         return verification_page(data, results.to_dict())
     if isinstance(results, StudyResult):
