@@ -70,6 +70,7 @@ PACKAGES = (
     "designs.run",
     "designs.derivatives.gradient",
     "studies",
+    "studies.report",
     "campaign",
     "engines",
     "errors",

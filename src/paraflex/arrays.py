@@ -30,16 +30,15 @@ class Brief:
         super().__init_subclass__(**options)
         # A dataclass keeps the representation that it finds in its class.
         if "__repr__" not in vars(cls):
-            cls.__repr__ = brief  # pyright: ignore[reportAttributeAccessIssue]
+            setattr(cls, "__repr__", brief)  # noqa: B010  type checkers take an assignment for a field
 
 
-@recursive_repr()
-def brief(record: Any) -> str:
+def brief(self: Any) -> str:
     """Return the representation of a dataclass or named tuple: all values if they are short, else each abbreviated."""
-    texts = {name: _in_full(value) for name, value in _values(record)}
+    texts = {name: _in_full(value) for name, value in _values(self)}
     if sum(map(len, (*texts, *texts.values()))) > _WHOLE:
-        texts = {name: _abbreviated(getattr(record, name), text) for name, text in texts.items()}
-    return f"{type(record).__qualname__}({', '.join(f'{name}={text}' for name, text in texts.items())})"
+        texts = {name: _abbreviated(getattr(self, name), text) for name, text in texts.items()}
+    return f"{type(self).__qualname__}({', '.join(f'{name}={text}' for name, text in texts.items())})"
 
 
 def whole(value: Any) -> str:
@@ -56,6 +55,7 @@ def _values(record: Any) -> list[tuple[str, Any]]:
     return [(name, getattr(record, name)) for name in shown or getattr(record, "_fields", ())]
 
 
+@recursive_repr()
 def _in_full(value: Any) -> str:
     shape = getattr(value, "shape", ())
     if isinstance(shape, tuple) and (len(shape) > 1 or max(shape, default=0) > _FEW):
