@@ -233,6 +233,11 @@ def test_wrong_entries_of_a_dictionary_are_named_by_their_fields(changed, messag
         pf.load_sweep(STUDY | changed)
 
 
+def test_numbers_of_numpy_are_numbers():
+    study = STUDY | {"samples": np.int64(11), "vary": {"link1.elements": {"values": [np.int64(2), np.int64(3)]}}}
+    assert pf.load_sweep(study).designs.tolist() == [[2.0], [3.0]]
+
+
 def test_a_dictionary_is_not_changed():
     study = STUDY | {"vary": {"bar.thickness": {"values": np.array([0.005, 0.006])}}}
     pf.load_sweep(study)
