@@ -34,10 +34,10 @@ from common import command_line, table, write_json
 
 import paraflex as pf
 from paraflex.campaign import Workers, read_data
-from paraflex.cli.report import page_of
 from paraflex.designs.reopen import open_study
 from paraflex.errors import InputError
 from paraflex.plots.sources import open_source
+from paraflex.reports.kind_page import page_of
 from paraflex.studies import (
     load_identification,
     load_indices,

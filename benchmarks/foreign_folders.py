@@ -429,7 +429,7 @@ def _import_once() -> None:
     import paraflex.cli.app
     import paraflex.plots
     import paraflex.plots.film
-    import paraflex.report
+    import paraflex.reports
     import paraflex.results.export
     import paraflex.studies  # noqa: F401
 

@@ -447,7 +447,7 @@ def main() -> None:
     import paraflex.cli.app
     import paraflex.library
     import paraflex.plots
-    import paraflex.report
+    import paraflex.reports
     import paraflex.studies
 
     failures = ("hang", "silent", "error", "differs", "left")

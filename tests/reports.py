@@ -15,8 +15,8 @@ import xarray as xr
 from paraflex.integrators import IntegrationOptions
 from paraflex.mechanism import raparm_i
 from paraflex.paths import Polygon
-from paraflex.report import Page, render
-from paraflex.report.packing import MISSING
+from paraflex.reports import Page, render
+from paraflex.reports.packing import MISSING
 from paraflex.studies import run_study
 from paraflex.studies.verification import VerificationOptions, VerificationStudy
 from paraflex.tracking import plan_tracking

@@ -25,7 +25,7 @@ from paraflex.plots import film, mechanism_drawing
 from paraflex.plots.film import FilmOptions, animate, find_encoder, plan_film
 from paraflex.plots.marks import block, ground_of, is_guide, moving_marks, zigzag
 from paraflex.plots.scene import ARROW, scale_bar, scene, select
-from paraflex.report.film import animation
+from paraflex.reports.film import animation
 from paraflex.results import motion_dataset
 from processes import run, started
 

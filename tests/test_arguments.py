@@ -13,7 +13,7 @@ import pytest
 import paraflex as pf
 import paraflex.dynamics
 import paraflex.mechanism
-import paraflex.report
+import paraflex.reports
 import paraflex.results
 import paraflex.studies
 from paraflex.arguments import checked_arguments
@@ -214,9 +214,9 @@ SLIPS = [
     ("motion_case(pend,0.1,start=None)", "start: is not given"),
     ("motion_case(mech,'1',start=3)", "duration: not a number"),
     ("pf.sweep('nostudy.toml',tmp)", "nostudy.toml: file: cannot be read (no such file or directory)"),
-    ("pf.sweep(3,tmp)", "study: not a sweep or a file name"),
-    ("pf.sweep(model,tmp)", "study: not a sweep or a file name"),
-    ("pf.sweep({'a':1},tmp)", "study: not a sweep or a file name"),
+    ("pf.sweep(3,tmp)", "study: not a sweep, a file name or a dictionary"),
+    ("pf.sweep(model,tmp)", "study: not a sweep, a file name or a dictionary"),
+    ("pf.sweep({'a':1},tmp)", "mechanism: is missing"),
     ("pf.sweep('nostudy.toml',3)", "folder: not a file name"),
     ("pf.load_sweep(3)", "file: not a file name"),
     ("pf.load_sweep(model)", "file: not a file name"),
@@ -230,16 +230,16 @@ SLIPS = [
         "pf.load_sensitivities('no.toml',metrics='tracking_rms')",
         "no.toml: file: cannot be read (no such file or directory)",
     ),
-    ("pf.optimise(3,tmp)", "study: not an optimisation or a file name"),
-    ("pf.optimise(model,tmp)", "study: not an optimisation or a file name"),
+    ("pf.optimise(3,tmp)", "study: not an optimisation, a file name or a dictionary"),
+    ("pf.optimise(model,tmp)", "study: not an optimisation, a file name or a dictionary"),
     ("pf.optimise('no.toml',tmp)", "no.toml: file: cannot be read (no such file or directory)"),
     ("pf.optimise('no.toml',3)", "folder: not a file name"),
-    ("pf.identify(3,tmp)", "study: not an identification or a file name"),
+    ("pf.identify(3,tmp)", "study: not an identification, a file name or a dictionary"),
     ("pf.identify('no.toml',None)", "folder: is not given"),
-    ("pf.indices(3,tmp)", "study: not an IndicesStudy or a file name"),
+    ("pf.indices(3,tmp)", "study: not an IndicesStudy, a file name or a dictionary"),
     ("pf.indices('no.toml',tmp,samples='3')", "samples: not a whole number"),
-    ("pf.sensitivities(3)", "study: not a SensitivityStudy or a file name"),
-    ("pf.sensitivities(model)", "study: not a SensitivityStudy or a file name"),
+    ("pf.sensitivities(3)", "study: not a SensitivityStudy, a file name or a dictionary"),
+    ("pf.sensitivities(model)", "study: not a SensitivityStudy, a file name or a dictionary"),
     ("pf.sensitivities('no.toml',at=[1])", "at: not a dictionary"),
     ("pf.load(3)", "name_or_file: not a file name"),
     ("pf.load(None)", "name_or_file: is not given"),
@@ -389,7 +389,7 @@ def given(tmp_path_factory):
     run, mrun = task.simulate("++++"), simulate_motion(pend, 0.05, samples=5)
     data = pf.tracking_dataset(run)
     pf.save_results(data, tmp / "results.nc")
-    public = [paraflex.mechanism, paraflex.dynamics, paraflex.results, paraflex.studies, paraflex.report]
+    public = [paraflex.mechanism, paraflex.dynamics, paraflex.results, paraflex.studies, paraflex.reports]
     names = {name: getattr(module, name) for module in public for name in dir(module) if not name.startswith("_")}
     functions = [simulate, simulate_ked, simulate_motion, export, result_tables]
     return names | {each.__name__: each for each in functions} | {

@@ -16,8 +16,8 @@ from paraflex.figures.entry import prepared
 from paraflex.figures.tables import Column, Table
 from paraflex.formatting import common_unit, display_unit, number, quantity, typeset
 from paraflex.plots.labels import mathematics
-from paraflex.report.page import Page, render
-from paraflex.report.text import table_html
+from paraflex.reports.page import Page, render
+from paraflex.reports.text import table_html
 from paraflex.units import DisplayUnit
 
 

@@ -8,7 +8,7 @@ from typer.main import get_command
 import paraflex as pf
 from paraflex.cli import app as program
 from paraflex.errors import InputError
-from paraflex.report.provenance import command_line
+from paraflex.reports.provenance import command_line
 
 COMMANDS = program.all_commands(get_command(program.app))
 NEEDED = {"report": ["r"], "animate": ["r", "o"], "export": ["r"], "plot": ["r"], "new": ["n"]}
@@ -16,6 +16,7 @@ STUDIES = ("sensitivity", "sweep", "optimise", "optimize", "identify", "indices"
 NEEDED |= {name: ["study.toml"] for name in STUDIES}
 MODEL_COMMANDS = (
     "run", "verify", "compare-methods", "control compare", "modes", "linearise", "reduce", "statics", "draw", "info",
+    "kinematics", "torques",
 )  # fmt: skip
 
 
@@ -96,6 +97,8 @@ def test_every_command_with_a_mechanism_takes_both():
 
 # Options that say where results go and how they are shown.
 SHOWN = {"out", "force", "figures", "report", "json"}
+# It is repeated by the names of its modes.
+NAMED = {"servo"}
 
 
 def asked_for(tmp_path, *line):
@@ -137,5 +140,5 @@ def test_every_option_of_a_run_is_in_the_command_that_repeats_it_or_shows_result
     # The model is the command's argument.
     words |= {"--mechanism"} if "five_bar" in words else set()
     for parameter in COMMANDS["run"].params:
-        if parameter.name not in SHOWN and parameter.opts[0].startswith("-"):
+        if parameter.name not in SHOWN | NAMED and parameter.opts[0].startswith("-"):
             assert words & set(parameter.opts), parameter.name

@@ -21,7 +21,7 @@ from paraflex.files import model_from
 from paraflex.files.schema import model_schema
 from paraflex.plots.planned import figures_of
 from paraflex.plots.sources import open_source
-from paraflex.report.provenance import asked, command_line
+from paraflex.reports.provenance import asked, command_line
 from paraflex.results.controllers import controllers_of
 from paraflex.studies.tracking import TrackingStudy
 from rotors import ROTOR, rotor

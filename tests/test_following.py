@@ -130,7 +130,7 @@ def test_the_model_file_says_which_error_ranks_modes(paper_run):
 
 def test_figures_and_pages_are_ranked_by_the_headline(paper_run):
     from paraflex import plots
-    from paraflex.report import render, tracking_page
+    from paraflex.reports import render, tracking_page
 
     for error, words in (("motion", "of the motion"), ("whole", "of the whole run")):
         data = tracking_dataset(paper_run, error=error)

@@ -43,8 +43,8 @@ from paraflex.motion import simulate_motion
 from paraflex.plots.marks import moving_marks
 from paraflex.plots.scene import scene
 from paraflex.plots.svg import sketch
-from paraflex.report.film import animation
-from paraflex.report.sweep import side_by_side
+from paraflex.reports.film import animation
+from paraflex.reports.sweep import side_by_side
 from paraflex.results import motion_dataset
 from paraflex.results.drawing import assembled_data
 from paraflex.results.record import record

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import xarray as xr
 
-import paraflex.report
+import paraflex.reports
 from paraflex.errors import InputError
 from paraflex.figures.charts import Curve
 from paraflex.folders import DATA_FILES, FOLDER_FILES, RESULT_KINDS
@@ -23,7 +23,7 @@ def test_every_kind_with_data_has_figures_and_a_report_or_says_why_not():
             assert kind.data in kind.files
         if kind.page:
             module, _, function = kind.page.partition(".")
-            assert callable(getattr(getattr(paraflex.report, module), function))
+            assert callable(getattr(getattr(paraflex.reports, module), function))
 
 
 def test_folders_are_told_apart_by_their_files():

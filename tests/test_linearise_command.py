@@ -15,7 +15,7 @@ from paraflex.dynamics.points import marker_place
 from paraflex.files import library_text
 from paraflex.linear.branches import pole_branches
 from paraflex.mechanism import Assembly, LossFactor, Mechanism, Motor, PointRef, RevoluteJoint
-from paraflex.report import linear_page, save_page
+from paraflex.reports import linear_page, save_page
 from paraflex.results import linear_dataset, linear_summary
 from paraflex.results.linear_motion import drawn_modes, modal_motion
 from paraflex.results.linear_summary import limiting_zero, roots

@@ -24,7 +24,7 @@ from paraflex.mechanism import (
     TorsionalDamper,
 )
 from paraflex.motion import simulate_motion
-from paraflex.report import motion_page
+from paraflex.reports import motion_page
 from paraflex.results import load_results, motion_dataset, motion_summary, open_results, save_results
 from shell import paraflex
 from test_loads import INERTIA, MASS, REACH, G, pendulum

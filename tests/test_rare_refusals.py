@@ -24,7 +24,7 @@ from paraflex.integrators import sensitivity
 from paraflex.mechanism import Material, ModalBody, ModalPoint, PointRef, RigidBody, SlidingJoint, parse_mode
 from paraflex.motion import simulate_motion
 from paraflex.plots import pareto_front
-from paraflex.report.page import plotly_script
+from paraflex.reports.page import plotly_script
 from paraflex.studies import load_sensitivities, load_sweep, motion_case, sensitivities, sweep
 from paraflex.tracking import simulate
 
@@ -114,7 +114,7 @@ def test_packages_that_are_missing(study, tmp_path, monkeypatch):
     model = pf.load("five_bar")
     task = pf.plan(model.mechanism, model.path("square"), duration=0.02, samples=3)
     refused(lambda: task.simulate("++", method="ida"), "method", "SUNDIALS", "pip install")
-    monkeypatch.setattr("paraflex.report.page.find_spec", lambda _: None)
+    monkeypatch.setattr("paraflex.reports.page.find_spec", lambda _: None)
     # Once read it is kept.
     whole = partial(plotly_script.__wrapped__, whole=True)
     refused(whole, "plotly", "not installed, or without its script", "--force-reinstall plotly")

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import paraflex as pf
-from paraflex.report import reduction_page, save_page
+from paraflex.reports import reduction_page, save_page
 from paraflex.results import save_results
 from shell import paraflex
 

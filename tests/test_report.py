@@ -16,11 +16,11 @@ from paraflex.errors import InputError, OutputError
 from paraflex.figures.charts import Axis, Panel
 from paraflex.formatting import display_units, number as format_number, text_symbol as symbol, typeset
 from paraflex.plots.catalogue import CATALOGUE
-from paraflex.report import Page, animation, motion_page, render, save_page, tracking_page, verification_page
-from paraflex.report.designs import PARALLEL, DesignChart
-from paraflex.report.film import MOST_FRAMES, frames_of
-from paraflex.report.packing import Series, packed
-from paraflex.report.page import plotly_script
+from paraflex.reports import Page, animation, motion_page, render, save_page, tracking_page, verification_page
+from paraflex.reports.designs import PARALLEL, DesignChart
+from paraflex.reports.film import MOST_FRAMES, frames_of
+from paraflex.reports.packing import Series, packed
+from paraflex.reports.page import plotly_script
 from paraflex.results import load_results, open_results
 from reports import FAILED, MODES, STOPPED, array_of, chart_of, html_of, rows_of, told, tracked, verified
 from shell import paraflex
@@ -380,7 +380,7 @@ def test_a_page_appears_whole_or_not_at_all(tmp_path):
 
 
 def test_without_plotly_it_is_said(monkeypatch):
-    monkeypatch.setattr("paraflex.report.page.find_spec", lambda name: None)
+    monkeypatch.setattr("paraflex.reports.page.find_spec", lambda name: None)
     plotly_script.cache_clear()
     assert "report-data" in render(Page("a", "test"))
     with pytest.raises(InputError, match="plotly: not installed"):

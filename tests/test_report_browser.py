@@ -11,7 +11,7 @@ from colours import APART, colour_distance
 from conftest import DESKTOP, PHONE, LastingBrowser, is_ours, page_asks
 from paraflex.figures.charts import Axis
 from paraflex.plots.themes import THEMES
-from paraflex.report import Chart, Curve, Page as ReportPage, Panel, save_page, tracking_page, verification_page
+from paraflex.reports import Chart, Curve, Page as ReportPage, Panel, save_page, tracking_page, verification_page
 from reports import FAILED, MODES, tracked, verified
 
 # Of opening, on a machine that is busy with other tests as well: the best of so many is told [ms].

@@ -28,7 +28,7 @@ from paraflex.mechanism import (
     RigidBody,
 )
 from paraflex.motion import simulate_motion
-from paraflex.report import motion_page, tracking_page
+from paraflex.reports import motion_page, tracking_page
 from paraflex.results import load_results, motion_dataset, motion_summary, save_results, summary, tracking_dataset
 from paraflex.results.export import result_tables
 from paraflex.results.loads import effort_lines, joint_line, load_figures, stress_line

@@ -10,9 +10,9 @@ import pytest
 
 from paraflex.figures.search import tables, tiles as search_tiles
 from paraflex.formatting import display_unit
-from paraflex.report.choice import best_runs
-from paraflex.report.sweep import StudyAccount, sweep_page
-from paraflex.report.text import sections
+from paraflex.reports.choice import best_runs
+from paraflex.reports.sweep import StudyAccount, sweep_page
+from paraflex.reports.text import sections
 from test_sweep_report import made_up
 
 IDENTIFIED = {

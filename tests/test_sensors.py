@@ -33,7 +33,7 @@ from paraflex.mechanism import SENSOR_KINDS, Encoder, Sensor, StrainGauge
 from paraflex.mechanism.segments import in_frames
 from paraflex.mechanism.sensors import Location
 from paraflex.motion import simulate_motion
-from paraflex.report.motion import motion_page
+from paraflex.reports.motion import motion_page
 from paraflex.results import motion_summary
 from paraflex.results.export import result_tables
 from paraflex.units import DisplayUnit

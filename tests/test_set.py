@@ -12,7 +12,7 @@ from paraflex.cli.sensitivity import _values
 from paraflex.designs.sweep import load_sweep
 from paraflex.files import load_data
 from paraflex.files.overlay import find_place, value_of, with_values
-from paraflex.report.provenance import asked, command_line
+from paraflex.reports.provenance import asked, command_line
 from paraflex.studies import load_sensitivities
 from shell import paraflex
 

@@ -215,7 +215,7 @@ for command in ("run", "verify", "motion", "linear"):
     importlib.import_module(f"paraflex.cli.{command}")
     print(command, *set(sys.argv) & set(sys.modules))
 """
-    found = python("-c", look, "matplotlib", "paraflex.report", "paraflex.plots.save")
+    found = python("-c", look, "matplotlib", "paraflex.reports", "paraflex.plots.save")
     assert found == ["run", "verify", "motion", "linear"]
 
 

@@ -11,7 +11,7 @@ import paraflex as pf
 from flexures import guide, truss
 from paraflex.errors import LimitPointError
 from paraflex.figures.charts import is_logarithmic, joined
-from paraflex.report import render, save_page, statics_page
+from paraflex.reports import render, save_page, statics_page
 from paraflex.results import load_results
 from shell import paraflex
 

@@ -24,7 +24,7 @@ from paraflex.mechanism import (
 )
 from paraflex.mechanism.bodies import Material, Section
 from paraflex.plots.scene import default_magnification, scene, select
-from paraflex.report.film import animation
+from paraflex.reports.film import animation
 from paraflex.results import drawing as drawings
 from paraflex.results.drawing import drawing_coordinates, drawing_variables, system_drawing
 from paraflex.results.outlines import outlines

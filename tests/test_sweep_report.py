@@ -12,9 +12,9 @@ from paraflex.designs.units import unit_of
 from paraflex.errors import InputError
 from paraflex.figures.designs import DesignTable, failure_table, fronts, in_conflict, read_designs, undominated
 from paraflex.files import library_file
-from paraflex.report.choice import MOST_RUNS, best_runs, drawn_rows
-from paraflex.report.film import frames_of
-from paraflex.report.sweep import StudyAccount, sweep_page
+from paraflex.reports.choice import MOST_RUNS, best_runs, drawn_rows
+from paraflex.reports.film import frames_of
+from paraflex.reports.sweep import StudyAccount, sweep_page
 from paraflex.studies import load_optimisation, load_sweep, optimise, sweep
 from paraflex.studies.sweeps.report import study_page
 from paraflex.writing import read_json, write_json

@@ -4,7 +4,7 @@ import pytest
 from playwright.sync_api import Page
 
 from conftest import DESKTOP, PHONE
-from paraflex.report import save_page
+from paraflex.reports import save_page
 from paraflex.studies import load_sweep, sweep
 from paraflex.studies.sweeps.report import study_page
 from test_report_browser import SharedPages, choose_run, drawn, wait_for_drawing

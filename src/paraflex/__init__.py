@@ -11,12 +11,13 @@ from typing import Any
 import lazy_loader
 
 from .cache_folder import ensure_cache_folder
-from .late import save_file, view
+from .late import played, save_file, view
 
 ensure_cache_folder(Path(__file__).parent / "kernel")
 
 # Modules that register functions of objects of lower layers.
 view.modules = ("paraflex.results.html", "paraflex.plots.mechanism_html", "paraflex.studies.html")
+played.modules = ("paraflex.plots.film",)
 save_file.modules = ("paraflex.files.model",)
 
 _loaded, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -147,7 +147,7 @@ from .control.environment import Environment as Environment
 from .control.vector_environment import VectorEnvironment as VectorEnvironment
 
 # Studies
-from .campaign import Workers as Workers
+from .campaign import Workers as Workers, progress_bar as progress_bar
 from .studies import (
     run_study as run_study,
     verify as verify,
@@ -182,6 +182,7 @@ from .results import (
 )
 from .results.export import export as export
 from .plots.film import FilmOptions as FilmOptions, animate as animate
+from .studies.report import report as report
 
 # Errors and warnings
 from .errors import (

@@ -21,6 +21,7 @@ from typing import Any, ParamSpec, TypeVar
 
 import numpy as np
 
+from .arrays import Brief
 from .errors import InputError, as_enum
 
 P = ParamSpec("P")
@@ -76,7 +77,7 @@ def checked_arguments(**remedies: str) -> Callable[[Callable[P, R]], Callable[P,
     return decorate
 
 
-class CheckedFields:
+class CheckedFields(Brief):
     """Base class of dataclasses whose fields are converted and checked by their annotations.
 
     A dataclass that defines `__post_init__` calls this one first. Errors prefix the field with `_table`, and with the

@@ -7,22 +7,32 @@ therefore registered by class with `late.view` in higher layers.
 import math
 from collections.abc import Container, Iterable, Sequence
 from html import escape
+from pathlib import Path
 from typing import Any
 
+from .arrays import Brief
 from .formatting import number, typeset
-from .late import view
+from .late import played, view
 
 # Largest number of rows shown of a table that could be long.
 _MOST_LISTED = 60
 _RULE = "1px solid rgba(128, 128, 128, 0.45)"
 
 
-class Shown:
+class Shown(Brief):
     """Base class of objects with a view in notebooks."""
 
     def _repr_html_(self) -> str:
         """Return the HTML for notebooks."""
         return view(self)
+
+
+class Played(Shown):
+    """Base class of runs and of results with runs."""
+
+    def animate(self, file: str | Path | None = None, modes: Sequence[str] = (), options: Any = None) -> Any:
+        """Return a film, which notebooks show; see `paraflex.animate`."""
+        return played(self, file, modes, options)
 
 
 def page(title: str, *parts: str) -> str:

@@ -34,6 +34,7 @@ class Late:
         return self._functions(thing, *given)
 
 
-# HTML of an object in notebooks; file of a mechanism, written to a path.
+# HTML of an object in notebooks; film of a run; file of a mechanism, written to a path.
 view: Late = Late()
+played: Late = Late()
 save_file: Late = Late()

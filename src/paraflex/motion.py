@@ -10,7 +10,7 @@ import numpy as np
 from .actuation import Electrical, electrical, electrical_findings
 from .arguments import checked_arguments, named_in_errors
 from .arrays import Array
-from .display import Shown
+from .display import Played
 from .dynamics import (
     JointMotion,
     State,
@@ -44,7 +44,7 @@ _COARSER, _GROWN, _SMALL = 100.0, 1e-3, 0.01
 
 @named_in_errors("a run without a path", "the run that simulate_motion returns")
 @dataclass(frozen=True)
-class MotionRun(Shown):
+class MotionRun(Played):
     """Run of a mechanism without a path.
 
     Attributes

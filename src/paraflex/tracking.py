@@ -21,8 +21,8 @@ from .actuation import (
     required_effort,
 )
 from .arguments import checked_arguments, named_in_errors
-from .arrays import Array
-from .display import Shown
+from .arrays import Array, Brief
+from .display import Played
 from .dynamics import (
     State,
     System,
@@ -71,7 +71,7 @@ class Ending(Enum):
 
 @named_in_errors("a task", "the task that plan_tracking makes")
 @dataclass(frozen=True)
-class TrackingTask:
+class TrackingTask(Brief):
     """Mechanism, path, and rigid motion along it: the common part of the runs of all modes.
 
     Attributes
@@ -215,7 +215,7 @@ class TrackingTask:
 
 @named_in_errors("a run along a path", "a run that simulate returns")
 @dataclass(frozen=True)
-class TrackingRun(Shown):
+class TrackingRun(Played):
     """Run of one mode of a task.
 
     Attributes

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from paraflex.arrays import Array, Mask
+from paraflex.arrays import Array, Brief, Mask
 from paraflex.dynamics import acting_loads, joint_coordinate
 from paraflex.dynamics.joint_coordinates import own_coordinate
 from paraflex.errors import ActuationError, Moment, SingularActuationError
@@ -24,7 +24,7 @@ SINGULAR_RATIO = 1e-6
 
 
 @dataclass(frozen=True)
-class Effort:
+class Effort(Brief):
     """Required effort of a rigid motion, and its actuation matrix.
 
     Attributes

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import scipy
 
-from paraflex.arrays import Array
+from paraflex.arrays import Array, Brief
 from paraflex.dynamics import System, joint_coordinate
 from paraflex.findings import Finding
 from paraflex.mechanism import ActuationMode, Actuator, Mechanism, actuators_by_motor
@@ -21,7 +21,7 @@ _LATE = 0.01
 
 
 @dataclass(frozen=True)
-class Electrical:
+class Electrical(Brief):
     """Currents and voltages of all motors in a run; NaN for a motor whose actuator does not define them.
 
     Attributes

@@ -6,7 +6,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from paraflex.arrays import Array
+from paraflex.arrays import Array, Brief
 from paraflex.dynamics import InputSignals
 from paraflex.errors import Moment, NumericalError
 from paraflex.mechanism import ActuationMode
@@ -27,7 +27,7 @@ _IN_TIME = ("t", "q", "v", "a", "basis")
 
 
 @dataclass(frozen=True)
-class FeedForward:
+class FeedForward(Brief):
     """Torque profiles of a mode.
 
     Attributes
@@ -104,7 +104,7 @@ def about(coefficients: Array, places: Array) -> Array:
 
 
 @dataclass(frozen=True)
-class TorquePlan:
+class TorquePlan(Brief):
     """Efforts of a rigid motion on a grid fine enough for splines of the torques of any mode.
 
     Attributes

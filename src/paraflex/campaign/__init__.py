@@ -20,6 +20,7 @@ from .study import (
     Workers as Workers,
     kept_in as kept_in,
     no_workers as no_workers,
+    progress_bar as progress_bar,
 )
 from .tables import (
     checked_rows as checked_rows,

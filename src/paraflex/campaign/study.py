@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import shutil
+import sys
 from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator
 from concurrent.futures import Executor
@@ -14,9 +15,11 @@ from typing import Any, ClassVar, Generic, TypeVar
 import xarray as xr
 
 from paraflex.arguments import CheckedFields
+from paraflex.arrays import Brief
 from paraflex.display import Shown
 from paraflex.errors import InputError
 from paraflex.folders import STUDY_OF_RUNS, ResultsFolder, hold_folder
+from paraflex.formatting import number
 from paraflex.results.storage import write_results
 from paraflex.writing import GO_ON, write_json
 from .folder import STUDY
@@ -61,6 +64,29 @@ class Progress:
 
 
 OnProgress = Callable[[Progress], None]
+
+
+def progress_bar(end: float | None = None) -> Callable[..., None]:
+    """Return a function to give as `on_progress`, which draws a bar on stderr, in scripts and in notebooks.
+
+    Parameters
+    ----------
+    end : float, optional
+        End of a simulation [s], which reports the time only.
+    """
+    drawn = ""
+
+    def draw(at: Any, total: float | None = end) -> None:
+        nonlocal drawn
+        done, total, doing = (at.done, at.total, at.doing) if isinstance(at, Progress) else (at, total, "")
+        share = min(max(0.0, done / total), 1.0) if total else 0.0
+        line = f"\r{'#' * round(40 * share):.<40} {f'{share:.0%}' if total else number(done, 3)} {doing:<30.30}"
+        line += "\n" if share == 1.0 else ""
+        if line != drawn:
+            print(line, end="", file=sys.stderr, flush=True)
+        drawn = line
+
+    return draw
 
 
 @dataclass(frozen=True)
@@ -189,7 +215,7 @@ class KeptResult(Result):
 R_co = TypeVar("R_co", bound=Result, covariant=True)
 
 
-class Study(ABC, Generic[R_co]):
+class Study(Brief, ABC, Generic[R_co]):
     """Base class of studies, which are read from a file or built in Python."""
 
     @abstractmethod

@@ -94,9 +94,9 @@ def drawing(
         try:
             with folder.added_files() as new:
                 if drawn.report and isinstance(results, xr.Dataset):
-                    from .report import page_of, save_page  # as does this one
+                    from paraflex.reports.kind_page import page_of  # as does this one
 
-                    save_page(page_of(results, folder.path), new / "report.html")
+                    page_of(results, folder.path).save(new / "report.html")
                 if finish is not None:
                     finish()
                     if (place / "figures").exists():

@@ -14,7 +14,7 @@ from paraflex.errors import InputError
 from paraflex.files import Model
 from paraflex.mechanism import parse_mode
 from paraflex.motion import MotionRun
-from paraflex.report.provenance import asked, command_line
+from paraflex.reports.provenance import asked, command_line
 from paraflex.results.kinds import kind_of
 from paraflex.results.storage import open_results
 from paraflex.tracking import TrackingRun, simulate

@@ -97,7 +97,7 @@ def _what(folder: Path, kind: str, found: dict[str, Any]) -> str:
         number = found.get("runs")
         runs = f" of {number} run{'' if number == 1 else 's'}" if number else ""
         return f'{article} {kind} "{found["name"]}"{runs}'
-    from paraflex.report.provenance import mechanism_argument
+    from paraflex.reports.provenance import mechanism_argument
 
     run = found["parameters"]["run"]
     text = f"a {kind} of {mechanism_argument(run['mechanism'])}"

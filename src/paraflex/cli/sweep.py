@@ -53,12 +53,12 @@ def _sweep(console: PlainConsole, study: SweepStudy, request: SweepRequest) -> S
 
 def _write_report(console: PlainConsole, result: SweepResult) -> None:
     """Write the report, unless the sweep was interrupted: the user should not have to wait for it."""
-    from .report import save_study_report
+    from paraflex.studies.report import report  # its import takes a while
 
     if result.interrupted:
         console.print_lines(f"no report: paraflex report {result.folder} writes it")
         return
-    save_study_report(result.folder, console)
+    report(result, on_progress=console.print_lines).save(result.folder / "report.html")
     console.print_lines(f"report: {result.folder / 'report.html'}")
 
 

@@ -111,7 +111,7 @@ class _Answers(BaseHTTPRequestHandler):
         elif place == f"{server.place}changed":
             self._send(server.changed(given.get("after", [""])[0]))
         else:
-            self._send((files("paraflex.report") / "assets" / "watch.html").read_bytes())
+            self._send((files("paraflex.reports") / "assets" / "watch.html").read_bytes())
 
     def _send(self, found: dict[str, Any] | bytes) -> None:
         """Send JSON, or a page; the browser may have left by now."""

@@ -1,17 +1,22 @@
 """Pydantic schema of the study file of a sweep, and a function that reads study files."""
 
-from collections.abc import Collection, Iterator
+from collections.abc import Callable, Collection, Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
-from typing import Any, ClassVar, Literal, TypeVar
+from typing import Annotated, Any, ClassVar, Literal, TypeVar
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, WrapValidator
 
 from paraflex.errors import InputError
+from paraflex.files import Model
+from paraflex.files.overlay import plain
 from paraflex.files.read import naming, read_toml, validate
 from paraflex.files.schema import Count, Number, NumberOfFields, Text, Yes
+from paraflex.mechanism import Mechanism
 
 T = TypeVar("T", bound=BaseModel)
+# Study file, or its content.
+StudyFile = str | Path | Mapping[str, Any]
 # Name of a study whose file does not give one.
 DEFAULT_NAME = "sweep"
 # Fields of a study that apply to runs only.
@@ -62,11 +67,18 @@ class IntegrationTable(FileTable):
     parameters: dict[str, Number] = Field(default={}, description="the method's own parameters")
 
 
+def _mechanism(value: Any, check: Callable[[Any], Any]) -> Any:
+    """Return a model or mechanism, which a study described in Python may hold, or the checked name of one."""
+    return value if isinstance(value, Model | Mechanism) else check(str(value) if isinstance(value, Path) else value)
+
+
 class SweepTable(FileTable):
     """Contents of a study file."""
 
     name: Text = Field(default=DEFAULT_NAME, description="a name for the study")
-    mechanism: Text = Field(description="a library mechanism or a file, relative to the study file's folder")
+    mechanism: Annotated[Text, WrapValidator(_mechanism)] = Field(
+        description="a library mechanism or a file, relative to the study file's folder"
+    )
     set: dict[str, Any] = Field(default={}, description="values in place of those of the mechanism's file, by field")
     paths: list[Text] = Field(
         default=[], description="paths of the mechanism's file by name; by default those of its [study]"
@@ -106,21 +118,21 @@ def check_of_statics(given: Collection[str]) -> None:
 
 
 @contextmanager
-def study_table(kind: type[T], file: str | Path) -> Iterator[tuple[T, Path]]:
+def study_table(kind: type[T], file: StudyFile) -> Iterator[tuple[T, Path]]:
     """Provide the contents of a study file and its folder; input errors raised in the context name the file.
 
     Parameters
     ----------
     kind : type
         Schema of the file.
-    file : str or Path
-        Study file.
+    file : str, Path or mapping
+        Study file; or its contents, whose mechanism may be an object, and whose folder is the current one.
 
     Raises
     ------
     InputError
         The file cannot be read, or a field does not fit.
     """
-    source = str(file)
+    source, folder = ("", Path()) if isinstance(file, Mapping) else (str(file), Path(file).parent)
     with naming(source):
-        yield validate(kind, read_toml(Path(file)), source), Path(file).parent
+        yield validate(kind, plain(file) if isinstance(file, Mapping) else read_toml(Path(file)), source), folder

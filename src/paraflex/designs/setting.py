@@ -9,6 +9,7 @@ from importlib.metadata import version
 from pathlib import Path as FilePath
 from typing import Any
 
+from paraflex.arrays import Brief
 from paraflex.equilibria.conditions import chosen_over
 from paraflex.errors import InputError, suggestion, within
 from paraflex.files import Model, StudyDefaults, library_names, model_from
@@ -46,7 +47,7 @@ _RESULT_PACKAGES = ("paraflex", "numpy", "scipy", "numba", "llvmlite")
 
 
 @dataclass(frozen=True)
-class Setting:
+class Setting(Brief):
     """Inputs of a run except the values of its design; sent to worker processes.
 
     Attributes
@@ -186,9 +187,11 @@ def make_setting(table: SweepTable, folder: FilePath) -> tuple[Setting, tuple[Sw
     InputError
         A field does not fit the mechanism, independently of the designs.
     """
-    name, beside = table.mechanism, folder / table.mechanism
-    own = name not in library_names() and not is_generated(name) and exists(beside)
-    model = read_model(str(beside) if own else name, table.set)
+    named: Any = table.mechanism
+    if isinstance(named, str):
+        own = named not in library_names() and not is_generated(named) and exists(folder / named)
+        named = str(folder / named) if own else named
+    model = read_model(named, table.set)
     runs = STATICS
     if table.statics is not None:
         check_of_statics(table.model_fields_set)

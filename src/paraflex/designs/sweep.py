@@ -44,7 +44,7 @@ from .measure import members_of
 from .reopen import study_account
 from .run import STATUS_COMPLETE, Outcome, RunTask, Task, is_row_of, lost, run_id, run_task, table_schema
 from .samples import SweptParameter, check_varied, designs
-from .schema import SweepTable, study_table
+from .schema import StudyFile, SweepTable, study_table
 from .setting import Setting, make_setting
 
 
@@ -237,12 +237,12 @@ class SweepStudy(Study["SweepResult"]):
 
 
 @checked_arguments()
-def load_sweep(file: str | Path) -> SweepStudy:
+def load_sweep(file: StudyFile) -> SweepStudy:
     """Read the study file of a sweep.
 
     Parameters
     ----------
-    file : str or Path
+    file : str, Path or mapping
         TOML file; see docs/sweeps.md.
 
     Raises
@@ -272,7 +272,7 @@ def make_study(table: SweepTable, folder: Path) -> SweepStudy:
 
 @checked_arguments()
 def sweep(
-    study: SweepStudy | str | Path,
+    study: SweepStudy | StudyFile,
     folder: str | Path,
     *,
     workers: Workers | int | None = None,
@@ -285,8 +285,8 @@ def sweep(
 
     Parameters
     ----------
-    study : SweepStudy, str or Path
-        Sweep, or its study file.
+    study : SweepStudy, str, Path or mapping
+        Sweep, its study file, or the contents of one.
     folder : str or Path
         Folder of the results.
     workers : Workers or int, optional

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from paraflex.arrays import Array
+from paraflex.arrays import Array, Brief
 from paraflex.dynamics import System, build_system
 from paraflex.dynamics.soundness import Mobility, mobility
 from paraflex.dynamics.state import State
@@ -79,7 +79,7 @@ class Drive:
 
 
 @dataclass(frozen=True)
-class ExactMotion:
+class ExactMotion(Brief):
     """Motion of a driven mechanism, at samples and between them.
 
     Attributes

@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import scipy
 
-from paraflex.arrays import Array, Mask
+from paraflex.arrays import Array, Brief, Mask
 from paraflex.dynamics import axis_angle, joint_coordinate
 from paraflex.dynamics.joint_coordinates import unit_vectors
 from paraflex.dynamics.points import PointMotion, cross, marker_position, point_motion
@@ -96,7 +96,7 @@ class Trail:
 
 
 @dataclass(frozen=True)
-class KinematicFeatures:
+class KinematicFeatures(Brief):
     """Properties of a driven motion.
 
     Attributes

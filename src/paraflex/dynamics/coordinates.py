@@ -6,7 +6,7 @@ from functools import cache, cached_property
 
 import numpy as np
 
-from paraflex.arrays import Array, Indices, Numbers
+from paraflex.arrays import Array, Brief, Indices, Numbers
 from paraflex.errors import InputError
 from paraflex.fem import BeamMesh, MassPoints, ModalBasis, ShapeIntegrals, mass_points, modal_basis, node_weights
 from paraflex.fem.eigen import is_definite
@@ -19,7 +19,7 @@ _SINGULAR = 1e-14
 
 
 @dataclass(frozen=True)
-class BodyCoordinates:
+class BodyCoordinates(Brief):
     """Indices of a body's coordinates in q, and the data to interpret them.
 
     Attributes
@@ -192,7 +192,7 @@ def body_coordinates(
 
 
 @dataclass(frozen=True)
-class PlacedBodies:
+class PlacedBodies(Brief):
     """A mechanism, and the coordinates of its bodies.
 
     Attributes

@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from paraflex.arrays import Array
+from paraflex.arrays import Array, brief
 from paraflex.mechanism import PointRef
 from .coordinates import GROUND_INDEX, Marker
 from .system import System
@@ -16,6 +16,7 @@ class PointMotion(NamedTuple):
     position: Array
     velocity: Array
     acceleration: Array
+    __repr__ = brief
 
 
 def point_motion(system: System, ref: PointRef, q: Array, v: Array, a: Array) -> PointMotion:

@@ -23,7 +23,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from paraflex.arrays import Array
+from paraflex.arrays import Array, Brief
 from paraflex.fem import BeamMesh
 from paraflex.mechanism import AssumedModesBeam, FlexibleBeam, Material, Section
 from paraflex.mechanism.bodies import per_span
@@ -76,7 +76,7 @@ class SectionLoads(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Sections:
+class Sections(Brief):
     """Stations along the flexible beams of a system: on both sides of every node, and between nodes.
 
     Attributes

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from paraflex.arrays import Array
+from paraflex.arrays import Array, Brief
 from paraflex.fem import BeamMesh, Lump, ShapeIntegrals, beam_integrals, rigid_integrals
 from paraflex.mechanism import AssumedModesBeam, Body, FlexibleBeam, ModalBody, RigidBody
 
@@ -20,7 +20,7 @@ class PointShape(NamedTuple):
 
 
 @dataclass(frozen=True)
-class BodyShape:
+class BodyShape(Brief):
     """A body in its own coordinates, which the matrix D of its integrals defines.
 
     Attributes

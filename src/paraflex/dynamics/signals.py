@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from paraflex.arrays import Array
+from paraflex.arrays import Array, brief
 from paraflex.errors import InputError, within
 from paraflex.kernel.packed import PackedSystem, Signals
 from paraflex.mechanism import Mechanism, TabulatedProfile, TimeProfile
@@ -30,6 +30,7 @@ class InputSignals(NamedTuple):
 
     breaks: Array
     coefficients: Array
+    __repr__ = brief
 
 
 def piecewise_quintic(t: Array, value: Array, rate: Array, acceleration: Array, left: float = 0.0) -> InputSignals:

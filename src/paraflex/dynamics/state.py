@@ -9,7 +9,7 @@ import numpy as np
 import scipy
 
 from paraflex.arguments import checked_arguments, named_in_errors
-from paraflex.arrays import Array
+from paraflex.arrays import Array, Brief
 from paraflex.errors import AssemblyError, InconsistentConstraintsError, Moment
 from paraflex.kernel.packed import Signals
 from paraflex.limits import solvable
@@ -34,7 +34,7 @@ VELOCITY_STIFFNESS = 1e9
 
 @named_in_errors("a state", "a state, as dynamics.consistent_state makes it")
 @dataclass(frozen=True)
-class State:
+class State(Brief):
     """State of a system: time [s], coordinates q (n,) and velocities v (n,)."""
 
     time: float

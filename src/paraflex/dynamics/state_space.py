@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import scipy
 
-from paraflex.arrays import Complex, Numbers
+from paraflex.arrays import Complex, Numbers, brief
 
 
 class StateSpace(NamedTuple):
@@ -15,6 +15,7 @@ class StateSpace(NamedTuple):
     B: Numbers
     C: Numbers
     D: Numbers
+    __repr__ = brief
 
     @classmethod
     def of(cls, *given: Any) -> "StateSpace":

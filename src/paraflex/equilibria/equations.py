@@ -20,7 +20,7 @@ import numpy as np
 import scipy
 from scipy.sparse import csr_matrix
 
-from paraflex.arrays import Array, Indices
+from paraflex.arrays import Array, Brief, Indices
 from paraflex.dynamics import State, System, acting_loads
 from paraflex.dynamics.constraints import coordinate_kind
 from paraflex.dynamics.sparse import Saddle, stiffness_diagonal, without_stiffness
@@ -65,7 +65,7 @@ class Matrices(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Equations:
+class Equations(Brief):
     """Equations of equilibrium of a system, relative to a start.
 
     Attributes

@@ -7,7 +7,7 @@ from functools import cached_property
 import numpy as np
 
 from paraflex.arguments import checked_arguments, named_in_errors
-from paraflex.arrays import Array, Indices, Mask
+from paraflex.arrays import Array, Brief, Indices, Mask
 from paraflex.display import Shown
 from paraflex.dynamics import System
 from paraflex.dynamics.points import point_motion
@@ -26,7 +26,7 @@ from .stability import Buckling, Vibrations
 
 
 @dataclass(frozen=True)
-class Equilibrium:
+class Equilibrium(Brief):
     """An equilibrium.
 
     Attributes

@@ -7,7 +7,7 @@ import numpy as np
 import scipy
 from scipy.sparse import csr_matrix
 
-from paraflex.arrays import Array
+from paraflex.arrays import Array, brief
 from paraflex.dynamics.linearise import DENSE_COORDINATES, LOWEST, admissible, all_modes, slowest, typical_square
 from paraflex.dynamics.sparse import Saddle, solved
 from .branch import Point
@@ -44,6 +44,7 @@ class Vibrations(NamedTuple):
     squares: Array
     shapes: Array
     complete: bool
+    __repr__ = brief
 
     @property
     def stable(self) -> bool:
@@ -68,6 +69,7 @@ class Buckling(NamedTuple):
     factors: Array
     shapes: Array
     reason: str
+    __repr__ = brief
 
 
 def vibrations(equations: Equations, found: Matrices) -> Vibrations:

@@ -10,13 +10,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from paraflex.arrays import Array, Indices
+from paraflex.arrays import Array, Brief, Indices
 from .integrals import GAUSS_FRACTIONS, GAUSS_PLACES, GAUSS_POINTS, GAUSS_WEIGHTS, Lump, SpanProperties
 from .mesh import BeamMesh
 
 
 @dataclass(frozen=True)
-class MassPoints:
+class MassPoints(Brief):
     """Representation of a beam by k mass points, the first g of which are its Gauss points.
 
     Attributes

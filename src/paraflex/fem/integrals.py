@@ -6,7 +6,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from paraflex.arrays import Array
+from paraflex.arrays import Array, Brief
 from .mesh import BeamMesh
 from .reference import ReferenceCondition, reference_basis
 
@@ -46,7 +46,7 @@ class Lump:
 
 
 @dataclass(frozen=True)
-class ShapeIntegrals:
+class ShapeIntegrals(Brief):
     """Inertia shape integrals and stiffness of a body in its body frame, with nf flexible coordinates u (rigid: 0).
 
     Attributes

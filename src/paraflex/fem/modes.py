@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 import scipy
 
-from paraflex.arrays import Array
+from paraflex.arrays import Array, Brief
 from .eigen import eigenpairs
 from .integrals import ShapeIntegrals
 
@@ -14,7 +14,7 @@ _LARGEST = 1.0 - 1e-6
 
 
 @dataclass(frozen=True)
-class ModalBasis:
+class ModalBasis(Brief):
     """Mass-normalised eigenmodes of (K, Mff).
 
     Attributes

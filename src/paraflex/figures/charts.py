@@ -9,7 +9,7 @@ from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
-from paraflex.arrays import Array, ArrayLike
+from paraflex.arrays import Array, ArrayLike, Brief
 from paraflex.formatting import common_unit, display_unit, labelled
 from paraflex.units import DisplayUnit
 
@@ -101,7 +101,7 @@ TIME = Axis("time", "s", "t")
 
 
 @dataclass(frozen=True)
-class Curve:
+class Curve(Brief):
     """Curve of a chart.
 
     Attributes
@@ -189,7 +189,7 @@ class ShownUnits(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Chart:
+class Chart(Brief):
     """Chart: curves with two axes.
 
     Attributes
@@ -278,7 +278,7 @@ class Chart:
 
 
 @dataclass(frozen=True)
-class Panel:
+class Panel(Brief):
     """Charts under one heading."""
 
     title: str

@@ -332,8 +332,8 @@ def load(name_or_file: str | FilePath, *, set: Mapping[str, Any] | None = None) 
     return model
 
 
-def read_model(name_or_file: str | FilePath, settings: Mapping[str, Any] | None = None) -> Model:
-    """Read a model as `load` does, without its warnings."""
+def read_model(name_or_file: str | FilePath | Model | Mechanism, settings: Mapping[str, Any] | None = None) -> Model:
+    """Read a model as `load` does, without its warnings; one built in Python as if it had been saved."""
     text, source, folder = _read(name_or_file)
     values = {name: plain(value) for name, value in (settings or {}).items()}
     return replace(model_from(_parsed(text, source, folder, values), source, text), settings=values)
@@ -374,8 +374,13 @@ def _parsed(text: str, source: str, folder: FilePath, settings: Mapping[str, Any
         return with_rows(with_values(parse_toml(text), settings), folder, list(settings.values()))
 
 
-def _read(name_or_file: str | FilePath) -> tuple[str, str, FilePath]:
+def _read(name_or_file: str | FilePath | Model | Mechanism) -> tuple[str, str, FilePath]:
     """Read a model's text; return it with the name of its source and the folder to which file names in it refer."""
+    if isinstance(name_or_file, Model | Mechanism):
+        from .document import document_text
+
+        model = Model(name_or_file) if isinstance(name_or_file, Mechanism) else name_or_file
+        return document_text(_data(model), model.text), model.source or model.mechanism.name, FilePath()
     text = str(name_or_file)
     if is_generated(text):
         return generated_text(text), text, FilePath()

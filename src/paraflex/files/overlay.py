@@ -67,9 +67,11 @@ def with_values(data: dict[str, Any], values: Mapping[str, Any]) -> dict[str, An
 
 
 def plain(value: Any) -> Any:
-    """Convert NumPy numbers and arrays, and tuples, to numbers and lists as used in TOML."""
+    """Convert NumPy numbers and arrays, tuples and mappings, to numbers, lists and dicts as used in TOML."""
     value = value.tolist() if hasattr(value, "tolist") else value
-    return list(value) if isinstance(value, tuple) else value
+    if isinstance(value, Mapping):
+        return {name: plain(each) for name, each in value.items()}
+    return list(map(plain, value)) if isinstance(value, tuple | list) else value
 
 
 def value_of(text: str) -> Any:

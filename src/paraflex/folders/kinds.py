@@ -35,7 +35,7 @@ class ResultKind:
     along : (str, str) or None
         Dimension along which the results go, and the name of the exported table over it; None without such a table.
     page : str
-        Function of `paraflex.report` for the report of a dataset, "module.function"; by default `kind_page`.
+        Function of `paraflex.reports` for the report of a dataset, "module.function"; by default `kind_page`.
     with_folder : bool
         Whether that function also takes the folder, for the summary in it.
     figures : tuple of str

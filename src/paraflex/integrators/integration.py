@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from paraflex.arguments import checked_arguments
-from paraflex.arrays import Array
+from paraflex.arrays import Array, brief
 from paraflex.dynamics import State, System, dependence, steep_times
 from paraflex.dynamics.change_points import dependent_drives
 from paraflex.dynamics.system import DENSE_ROWS
@@ -141,6 +141,7 @@ class IntegrationState(NamedTuple):
 
     arrays: tuple[np.ndarray, ...]
     more: dict[str, Any]
+    __repr__ = brief
 
 
 # Attributes of an integration that are saved beside the arrays of its run.

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from threading import Lock
 from typing import TYPE_CHECKING, Any, overload
 
-from paraflex.arrays import Array, Indices
+from paraflex.arrays import Array, Brief, Indices
 from paraflex.findings import Finding
 
 if TYPE_CHECKING:
@@ -52,7 +52,7 @@ class LateFindings(Sequence[Finding]):
 
 
 @dataclass(frozen=True)
-class Solution:
+class Solution(Brief):
     """Solution of a run at the requested times that were reached.
 
     Attributes

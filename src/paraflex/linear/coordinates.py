@@ -18,7 +18,7 @@ import numpy as np
 import scipy
 from scipy.sparse import csr_matrix
 
-from paraflex.arrays import Array, Indices
+from paraflex.arrays import Array, Brief, Indices
 from paraflex.dynamics import System, joint_coordinate, material_angle
 from paraflex.dynamics.constraints import coordinate_kind
 from paraflex.dynamics.points import marker_place
@@ -137,7 +137,7 @@ class RowTangents(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Coordinates:
+class Coordinates(Brief):
     """Candidate coordinates of a mechanism for linear models, independent of the pose.
 
     Attributes

@@ -18,7 +18,7 @@ import numpy as np
 import scipy
 
 from paraflex.arguments import checked_arguments
-from paraflex.arrays import Array
+from paraflex.arrays import Array, Brief
 from paraflex.errors import InputError
 from paraflex.mechanism.quantities import known
 from .coordinates import Variable
@@ -61,7 +61,7 @@ class Transitions(NamedTuple):
 
 
 @dataclass(frozen=True)
-class SampledModel:
+class SampledModel(Brief):
     """Discrete-time model along a motion: x_k+1 = Phi_k x_k + Gamma_k u_k + Gamma_next_k u_k+1, z = C x + D u.
 
     Attributes

@@ -21,7 +21,7 @@ import numpy as np
 import scipy
 from scipy.sparse import csr_matrix
 
-from paraflex.arrays import Array, Indices
+from paraflex.arrays import Array, Brief, Indices
 from paraflex.dynamics import System
 from paraflex.dynamics.sparse import Factor
 from paraflex.dynamics.tangents import MotionPoint
@@ -55,7 +55,7 @@ class MotionDerivatives(NamedTuple):
 
 
 @dataclass(frozen=True)
-class MinimalEquations:
+class MinimalEquations(Brief):
     """Linearised equations of motion at an operating point in chosen minimal coordinates.
 
     Attributes

@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 import scipy
 
-from paraflex.arrays import Array, Complex, Indices
+from paraflex.arrays import Array, Complex, Indices, brief
 from paraflex.dynamics.linearise import undamped_modes
 
 # Modal damping below this fraction of the largest is rounding.
@@ -31,6 +31,7 @@ class Motions(NamedTuple):
     shapes: Array
     poles: Complex
     pole_shapes: Complex
+    __repr__ = brief
 
 
 class SecondOrder(NamedTuple):

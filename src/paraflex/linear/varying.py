@@ -19,7 +19,7 @@ import numpy as np
 import scipy
 
 from paraflex.arguments import checked_arguments
-from paraflex.arrays import Array
+from paraflex.arrays import Array, Brief, brief
 from paraflex.dynamics import System, sensor_readings
 from paraflex.dynamics.tangents import MotionPoint
 from paraflex.errors import InputError, Moment, SingularPositionError, as_enum
@@ -55,10 +55,11 @@ class Along(NamedTuple):
     states: Array
     inputs: Array
     outputs: Array
+    __repr__ = brief
 
 
 @dataclass(frozen=True)
-class VaryingModel:
+class VaryingModel(Brief):
     """Linear time-varying model along a motion: x' = A(t) x + B(t) u, z = C(t) x + D(t) u.
 
     All variables are deviations from the nominal motion. The states are the same minimal coordinates along the motion,

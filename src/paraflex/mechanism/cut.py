@@ -5,11 +5,12 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
+from paraflex.arrays import Brief
 from .joints import PointRef
 
 
 @dataclass(frozen=True)
-class Cut:
+class Cut(Brief):
     """Mechanism as described by the user, and the map from its bodies to those of a derived mechanism.
 
     Attributes

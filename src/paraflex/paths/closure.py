@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from paraflex.arguments import checked_arguments
-from paraflex.arrays import Array, Mask
+from paraflex.arrays import Array, Brief, Mask
 from paraflex.dynamics import System, redundant_rows
 from paraflex.dynamics.points import point_motion
 from paraflex.errors import AssemblyError, InputError, Moment, NumericalError, UnreachablePathError
@@ -40,7 +40,7 @@ _OTHER = "it can be reached, but only past a Type I singularity or in another as
 
 
 @dataclass(frozen=True)
-class RigidMotion:
+class RigidMotion(Brief):
     """Motion of the rigid mechanism along a path.
 
     Attributes

@@ -6,7 +6,7 @@ from functools import cached_property
 
 import numpy as np
 
-from paraflex.arrays import Array, Indices, Mask
+from paraflex.arrays import Array, Brief, Indices, Mask
 from paraflex.dynamics import System, assembled_position, build_system, records, reference_pose, still_signals
 from paraflex.dynamics.system import DENSE_ROWS
 from paraflex.kernel.arrays import apart
@@ -20,7 +20,7 @@ _STEP_PIECES, _SHORTEST_STEP = 16, 1e-8
 
 
 @dataclass(frozen=True)
-class ClosedLoops:
+class ClosedLoops(Brief):
     """Motion as far as the loops close.
 
     Attributes

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from html import escape
 from io import StringIO
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import xarray as xr
@@ -25,6 +26,8 @@ from paraflex.arguments import checked_arguments
 from paraflex.errors import InputError, OutputError
 from paraflex.formatting import number
 from paraflex.interrupts import starting_processes
+from paraflex.late import played, view
+from paraflex.results.given import dataset_of
 from paraflex.writing import whole_file, whole_folder
 from .drawing import caption
 from .film_pictures import FOOT, HEAD, Film, clock, frames, stage
@@ -304,20 +307,22 @@ def plan_film(
 
 @checked_arguments()
 def animate(
-    data: xr.Dataset,
-    file: str | Path,
+    data: Any,
+    file: str | Path | None = None,
     modes: Sequence[str] = (),
     options: FilmOptions | None = None,
     *,
     on_progress: Callable[[int, int], None] | None = None,
 ) -> Film:
-    """Write a film of a run; the file appears whole or not at all.
+    """Make a film of a run, which notebooks show, and write it if a file is given, whole or not at all.
 
     Parameters
     ----------
-    data, modes, options
-        Results, actuation modes and options, as for `plan_film`.
-    file : str or Path
+    data : Any
+        Run, result of a study, dataset, or folder of results.
+    modes, options
+        Actuation modes and options, as for `plan_film`.
+    file : str or Path, optional
         File to write. The suffix selects the format: .mp4, .gif or .svg; .png is a single picture; a name without a
         suffix is a folder of PNG pictures, created if needed. Files of the same names are overwritten.
     on_progress : callable, optional
@@ -326,7 +331,7 @@ def animate(
     Returns
     -------
     Film
-        The scenes that were drawn.
+        The scenes that were drawn; in notebooks an animated SVG.
 
     Raises
     ------
@@ -335,19 +340,29 @@ def animate(
     OutputError
         The file cannot be written, or the encoder failed.
     """
-    file = Path(file)
-    kind = film_kind(file)
+    kind = ".svg" if file is None else film_kind(Path(file))
     if kind == ".mp4":
         # Checked before any planning: there may be no encoder.
         find_encoder()
-    film = plan_film(data, modes, options, kind)
+    film = plan_film(dataset_of(data, "data"), modes, options, kind)
+    if file is None:
+        return film
     report = on_progress or (lambda done, total: None)
-    whole = whole_file(file, remedy=_ELSEWHERE)
+    whole = whole_file(Path(file), remedy=_ELSEWHERE)
     if kind == "":
-        whole = whole_folder(file, replaced="frame_*.png", remedy=_ELSEWHERE)
+        whole = whole_folder(Path(file), replaced="frame_*.png", remedy=_ELSEWHERE)
     with whole as unfinished:
         write_film(film, kind, unfinished, report)
     return film
+
+
+@view.register(Film)
+def film_html(film: Film) -> str | None:
+    """Return the view of a film, an animated SVG; None for a single picture, of which notebooks show the text."""
+    return _animated_svg(film) if film.plays else None
+
+
+played.register(object)(animate)
 
 
 def film_kind(file: Path) -> str:

@@ -10,6 +10,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from paraflex.arrays import Array, NDArray
+from paraflex.display import Shown
 from paraflex.formatting import number
 from .drawing import Sketch, bare, caption, draw_load_keys, draw_scale_bar, name_links
 from .labels import plain
@@ -22,7 +23,7 @@ HEAD, FOOT = 0.105, 0.11
 
 
 @dataclass(frozen=True)
-class Film:
+class Film(Shown):
     """Film ready to be drawn: the scenes of all its panels at the times of its pictures.
 
     Attributes

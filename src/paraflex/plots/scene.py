@@ -1,7 +1,7 @@
 """Description of a drawn mechanism, in metres: links, joints, ground, springs, loads and paths at given times.
 
 Scenes are drawn by Matplotlib (`plots/drawing.py`), as SVG (`plots/svg.py`) and by the player of reports
-(`report/film.py`).
+(`reports/film.py`).
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
-from paraflex.arrays import Array
+from paraflex.arrays import Array, Brief
 from paraflex.errors import InputError, suggestion
 from paraflex.figures.selection import names_of, point_number, select_run
 from paraflex.figures.shapes import figure_of
@@ -76,7 +76,7 @@ class Limits(NamedTuple):
 
 
 @dataclass(frozen=True)
-class DrawnJoint:
+class DrawnJoint(Brief):
     """Joint at the f times of a scene.
 
     Attributes
@@ -127,7 +127,7 @@ class DrawnLoad(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Scene:
+class Scene(Brief):
     """Description of a run at the f times of its pictures.
 
     Attributes

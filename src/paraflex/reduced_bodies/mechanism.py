@@ -17,7 +17,7 @@ from typing import NamedTuple
 import numpy as np
 
 from paraflex.arguments import checked_arguments
-from paraflex.arrays import Array
+from paraflex.arrays import Array, brief
 from paraflex.dynamics import State, System, dependence
 from paraflex.dynamics.sparse import stiffness_diagonal
 from paraflex.errors import ActuationError, InputError, SingularActuationError
@@ -174,6 +174,7 @@ class Reduction(NamedTuple):
     full: TrackingTask
     deviation: float
     energy: float
+    __repr__ = brief
 
 
 @checked_arguments()

@@ -11,7 +11,7 @@ import scipy
 import xarray as xr
 
 from paraflex.arguments import checked_arguments
-from paraflex.arrays import Array
+from paraflex.arrays import Array, Brief
 from paraflex.errors import InputError
 from paraflex.folders import RUN, kind_of_folder
 from paraflex.formatting import number
@@ -110,7 +110,7 @@ class MotionPair:
 
 
 @dataclass(frozen=True)
-class RunComparison:
+class RunComparison(Brief):
     """Differences between two runs, as returned by `compare`.
 
     Attributes

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import xarray as xr
 
-from paraflex.arrays import Array
+from paraflex.arrays import Array, Brief
 from paraflex.errors import InputError
 from .formulas import largest_norm
 from .numbers import finite_or_none, largest, name_units
@@ -35,7 +35,7 @@ _ACTS = "acts after the delay, from one sample to the next; on the joint's secon
 
 
 @dataclass(frozen=True)
-class ControllerData:
+class ControllerData(Brief):
     """Controller in a dataset.
 
     Attributes

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from paraflex.arrays import Array, Complex, Numbers
+from paraflex.arrays import Array, Brief, Complex, Numbers
 from paraflex.dynamics import System, material_angle
 from paraflex.errors import InputError
 from paraflex.mechanism import GROUND, Body, Joint, Mechanism, PointRef, Pose, Relation, RigidBody, placed_poses
@@ -24,7 +24,7 @@ _NEAREST, _FARTHEST = 0.5, 2.0
 
 
 @dataclass(frozen=True)
-class Drawing:
+class Drawing(Brief):
     """Geometry of a mechanism at k samples, in the ground frame.
 
     With deflections magnified by a factor m, stations are at `base + m (shape - base)`, and so are joints. Bodies stay

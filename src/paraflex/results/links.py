@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from paraflex.arrays import Array, NDArray
+from paraflex.arrays import Array, Brief, NDArray
 from paraflex.dynamics import Marker, System, end_markers, joint_coordinate, material_angle, sensor_readings
 from paraflex.dynamics.joint_loads import (
     LoadComponents,
@@ -27,7 +27,7 @@ from .stress import Variables, section_result, section_variables, stress_errors
 
 
 @dataclass(frozen=True, kw_only=True)
-class Links:
+class Links(Brief):
     """Motion and loads of bodies, points, joints and motors at the k sample times that a run reached.
 
     Bodies, joints and points are those of the mechanism in its order, even if the model divides bodies into parts.

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from paraflex.arguments import named_in_errors
-from paraflex.arrays import Array
+from paraflex.arrays import Array, Brief
 from paraflex.control.loop.run_loop import ControllerRecord
 from paraflex.control.loop.runs import ControlledTracking
 from paraflex.dynamics.points import PointMotion
@@ -19,7 +19,7 @@ from .links import Links, system_links
 
 @named_in_errors("a record", "what results.record makes of a run")
 @dataclass(frozen=True, kw_only=True)
-class Record:
+class Record(Brief):
     """Run of a task, link by link.
 
     Attributes

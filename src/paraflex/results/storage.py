@@ -51,14 +51,14 @@ def save_results(data: xr.Dataset, path: str | Path) -> None:
     data : xarray.Dataset
         Results.
     path : str or Path
-        File to write, in an existing folder.
+        File to write; its folder is created if needed.
 
     Raises
     ------
     OutputError
         The file cannot be written.
     """
-    write_results(data, Path(path), parents=False)
+    write_results(data, Path(path))
 
 
 def write_results(data: xr.Dataset, path: Path, **options: Any) -> None:

@@ -10,8 +10,9 @@ import numpy as np
 import xarray as xr
 
 from paraflex.arguments import checked_arguments, named_in_errors
-from paraflex.arrays import Array
+from paraflex.arrays import Array, Brief
 from paraflex.campaign import Result
+from paraflex.display import Played
 from paraflex.errors import as_enum
 from paraflex.findings import Verdict
 from paraflex.folders import VERIFICATION
@@ -34,7 +35,7 @@ class Refinement(Enum):
 
 
 @dataclass(frozen=True)
-class ModelRuns:
+class ModelRuns(Brief):
     """Results of one model in one mode.
 
     Attributes
@@ -61,7 +62,7 @@ class ModelRuns:
 
 @named_in_errors("a verification", "what verify returns")
 @dataclass(frozen=True)
-class Verification(Result):
+class Verification(Result, Played):
     """Runs of all models in all modes.
 
     Attributes

@@ -19,7 +19,7 @@ from paraflex.designs.derivatives.plans import check_has_path, nominal_values
 from paraflex.designs.measure import SMOOTH, check_metric, check_smooth, metric_of, smooth_metrics
 from paraflex.designs.run import Task
 from paraflex.designs.samples import SweptParameter
-from paraflex.designs.schema import SweepTable, study_table
+from paraflex.designs.schema import StudyFile, SweepTable, study_table
 from paraflex.designs.setting import Setting, digest, make_setting
 from paraflex.errors import InputError
 from paraflex.findings import Verdict
@@ -246,12 +246,12 @@ class SensitivityStudy(WholeStudy[Sensitivities]):
 
 
 @checked_arguments()
-def load_sensitivities(file: str | Path, metrics: Sequence[str] = ()) -> SensitivityStudy:
+def load_sensitivities(file: StudyFile, metrics: Sequence[str] = ()) -> SensitivityStudy:
     """Read a sensitivity study from the file of a sweep, in which parameters need no values; sampling is ignored.
 
     Parameters
     ----------
-    file : str or Path
+    file : str, Path or mapping
         Study file, TOML; see docs/sensitivities.md.
     metrics : sequence of str
         Metrics that replace those of the file.
@@ -280,13 +280,13 @@ def load_sensitivities(file: str | Path, metrics: Sequence[str] = ()) -> Sensiti
 
 
 @checked_arguments()
-def sensitivities(study: SensitivityStudy | str | Path, *, at: Mapping[str, float] | None = None) -> Sensitivities:
+def sensitivities(study: SensitivityStudy | StudyFile, *, at: Mapping[str, float] | None = None) -> Sensitivities:
     """Compute the derivatives of the metrics of a study's runs with respect to its parameters.
 
     Parameters
     ----------
-    study : SensitivityStudy, str or Path
-        Study, or its file.
+    study : SensitivityStudy, str, Path or mapping
+        Study, its file, or the contents of one.
     at : mapping of str to float, optional
         Parameter values that replace those of the mechanism's file.
     """

@@ -16,6 +16,7 @@ from paraflex.arguments import CheckedFields, checked_arguments, refused
 from paraflex.campaign import THREADS, OnProgress, Progress, Result, WholeStudy, Workers
 from paraflex.campaign.workers import Calls
 from paraflex.control import ControllerDescription, simulate_controlled
+from paraflex.display import Played
 from paraflex.dynamics.sparse import stiffness_diagonal
 from paraflex.errors import ControllerError, InputError, IntegrationError, NumericalError
 from paraflex.findings import Finding
@@ -40,7 +41,7 @@ class Simulator(Protocol):
 
 
 @dataclass(frozen=True)
-class StudyResult(Result):
+class StudyResult(Result, Played):
     """Results of the modes of a study.
 
     Attributes

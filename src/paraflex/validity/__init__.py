@@ -6,6 +6,7 @@ geometry includes both, and neglects terms of fourth order in the slopes.
 
 from dataclasses import dataclass, replace
 
+from paraflex.arrays import Brief
 from paraflex.dynamics import System
 from paraflex.errors import ValidityWarning
 from paraflex.findings import Finding, warn_of
@@ -37,7 +38,7 @@ from .plausibility import (
 
 
 @dataclass(frozen=True)
-class Validity:
+class Validity(Brief):
     """Validity of a model for a run.
 
     Attributes

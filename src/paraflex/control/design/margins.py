@@ -10,7 +10,7 @@ import numpy as np
 import scipy
 
 from paraflex.arguments import checked_arguments
-from paraflex.arrays import Array, Complex
+from paraflex.arrays import Array, Brief, Complex
 from .closed_loops import ClosedLoop, closed_loop, warn_if_unstable
 
 if TYPE_CHECKING:
@@ -27,7 +27,7 @@ _ABOUT = np.array([0.0, 0.15, 0.4, 0.8, 1.5, 3.0, 6.0, 12.0, 25.0])
 
 
 @dataclass(frozen=True)
-class MotorMargins:
+class MotorMargins(Brief):
     """Margins of a loop opened at one motor, the others closed.
 
     Attributes
@@ -60,7 +60,7 @@ class MotorMargins:
 
 
 @dataclass(frozen=True)
-class Margins:
+class Margins(Brief):
     """Margins of a sampled loop at each motor, and at all motors together.
 
     Attributes

@@ -8,7 +8,7 @@ import numpy as np
 import scipy
 
 from paraflex.arguments import checked_arguments
-from paraflex.arrays import Array, Complex
+from paraflex.arrays import Array, Brief, Complex
 from paraflex.control.laws.discrete import side_by_side
 from paraflex.control.laws.kinds.rate_feedback import RateFeedback
 from paraflex.errors import InputError
@@ -32,7 +32,7 @@ _ROUNDS, _GROWS = 4, 1e-4
 
 
 @dataclass(frozen=True)
-class RateGains:
+class RateGains(Brief):
     """Rate feedback gains, and the vibrations for which they were designed.
 
     Attributes

@@ -8,7 +8,7 @@ import numpy as np
 import scipy
 
 from paraflex.arguments import checked_arguments
-from paraflex.arrays import Array, Complex
+from paraflex.arrays import Array, Brief, Complex
 from paraflex.errors import InputError
 from paraflex.mechanism.quantities import positive
 from .linear_law import LinearLaw
@@ -44,7 +44,7 @@ _DOUBLINGS, _CONVERGED = 60, 1e-15
 
 
 @dataclass(frozen=True)
-class KalmanFilter:
+class KalmanFilter(Brief):
     """Steady-state Kalman filter of x_k+1 = A x_k + B u_k + w_k, y_k = C x_k + e_k.
 
     At a sample the estimate is corrected, x + L (y - C x), then propagated with the torques that act, A x + B u.

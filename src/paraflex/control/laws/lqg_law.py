@@ -5,7 +5,7 @@ from functools import cached_property
 
 import numpy as np
 
-from paraflex.arrays import Array, Complex
+from paraflex.arrays import Array, Brief, Complex
 from paraflex.control.design.sampled import SampledPlant, WithPoles
 from paraflex.control.loop.together import SAME
 from paraflex.dynamics.state_space import StateSpace
@@ -16,7 +16,7 @@ from .linear_law import LinearLaw, LinearState
 
 
 @dataclass(frozen=True)
-class Regulator(WithPoles):
+class Regulator(WithPoles, Brief):
     """State feedback u = -`gain` [x; integrals] of a sampled plant.
 
     Attributes
@@ -41,7 +41,7 @@ class Regulator(WithPoles):
 
 
 @dataclass(frozen=True)
-class LQGDesign(WithPoles):
+class LQGDesign(WithPoles, Brief):
     """Regulator that acts on the estimate of a Kalman filter.
 
     Attributes

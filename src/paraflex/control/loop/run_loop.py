@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from paraflex.arrays import Array
+from paraflex.arrays import Array, Brief
 from paraflex.control.laws.controllers import Controller, Plant
 from paraflex.control.laws.discrete import DiscreteModel
 from paraflex.errors import InputError
@@ -31,7 +31,7 @@ class PendingTorques(NamedTuple):
 
 
 @dataclass(frozen=True)
-class ControllerRecord:
+class ControllerRecord(Brief):
     """Record of a controller in a run.
 
     Attributes

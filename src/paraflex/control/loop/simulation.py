@@ -11,7 +11,7 @@ import numpy as np
 
 from paraflex.actuation import FeedForward, actuation_condition
 from paraflex.arguments import checked_arguments, named_in_errors
-from paraflex.arrays import Array
+from paraflex.arrays import Array, Brief, whole
 from paraflex.control.laws.controllers import Controller, Plant
 from paraflex.control.laws.described import ControllerDescription
 from paraflex.dynamics import State, System
@@ -41,7 +41,7 @@ _ROUNDING = 1e-12
 
 @named_in_errors("a saved simulation", "what Simulation.save returned")
 @dataclass(frozen=True)
-class Saved:
+class Saved(Brief):
     """Complete state of a simulation: see `Simulation.save`.
 
     Attributes
@@ -276,7 +276,7 @@ class Simulation:
     def _identity(self) -> str:
         """Digest of everything on which the continuation of a saved state depends."""
         signals, start = self._integration.run.problem.signals, self._initial
-        found = hashlib.blake2b(repr((self.mechanism, self.mode, self._options, self._fed_forward)).encode())
+        found = hashlib.blake2b(whole((self.mechanism, self.mode, self._options, self._fed_forward)).encode())
         for array in (*self.system.packed, *signals, self._times, start.q, start.v):
             found.update(np.ascontiguousarray(array).tobytes())
         return found.hexdigest()

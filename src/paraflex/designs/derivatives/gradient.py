@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from paraflex.arrays import Array
+from paraflex.arrays import Array, Brief
 from paraflex.designs.measure import measure, metric_columns, metric_values, smooth_metrics
 from paraflex.designs.run import Task, plan_task
 from paraflex.designs.setting import Setting
@@ -31,7 +31,7 @@ from .steps import part, stepped
 
 
 @dataclass(frozen=True)
-class ModeGradients:
+class ModeGradients(Brief):
     """Metrics of one run and their gradients.
 
     Attributes

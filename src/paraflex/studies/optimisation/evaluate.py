@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from paraflex.arrays import Array
+from paraflex.arrays import Array, Brief
 from paraflex.campaign import Engine, Journal, LostWorker, Result, Row, checked_rows, outcomes
 from paraflex.designs.run import STATUS_COMPLETE, Outcome, RunTask, Task, lost, run_id, run_task
 from paraflex.designs.setting import Setting
@@ -23,7 +23,7 @@ class LimitReached(Exception):
 
 
 @dataclass(frozen=True)
-class EvaluatedDesign:
+class EvaluatedDesign(Brief):
     """Evaluated design and the rows of its runs.
 
     Attributes

@@ -9,11 +9,11 @@ from typing import Any, ClassVar
 import numpy as np
 
 from paraflex.arguments import checked_arguments, named_in_errors
-from paraflex.arrays import Array
+from paraflex.arrays import Array, Brief
 from paraflex.campaign import OnProgress, Workers
 from paraflex.campaign.study import Result
 from paraflex.designs.run import RunTask
-from paraflex.designs.schema import study_table
+from paraflex.designs.schema import StudyFile, study_table
 from paraflex.designs.units import check_unit_of_metric
 from paraflex.errors import InputError, suggestion
 from paraflex.results.numbers import finite_or_none
@@ -37,7 +37,7 @@ ONE_DEVIATION = math.erf(math.sqrt(0.5))
 
 
 @dataclass(frozen=True)
-class Confidence:
+class Confidence(Brief):
     """Accuracy to which the targets determine the parameters, linearised about the identified design.
 
     Attributes
@@ -293,7 +293,7 @@ class IdentificationStudy(SearchStudy[IdentificationResult]):
 
 
 @checked_arguments()
-def load_identification(file: str | Path) -> IdentificationStudy:
+def load_identification(file: StudyFile) -> IdentificationStudy:
     """Read the study file of an identification; see `load_optimisation`."""
     with study_table(StudyTable, file) as (table, folder):
         if not table.target:
@@ -311,7 +311,7 @@ def load_identification(file: str | Path) -> IdentificationStudy:
 
 @checked_arguments()
 def identify(
-    study: IdentificationStudy | str | Path,
+    study: IdentificationStudy | StudyFile,
     folder: str | Path,
     *,
     workers: Workers | int | None = None,
@@ -322,8 +322,8 @@ def identify(
 
     Parameters
     ----------
-    study : IdentificationStudy, str or Path
-        Study, or its file.
+    study : IdentificationStudy, str, Path or mapping
+        Study, its file, or the contents of one.
     folder, workers, on_progress
         See `Study.run`; an integer number of workers is a number of threads.
     run : callable, optional

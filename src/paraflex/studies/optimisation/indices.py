@@ -13,7 +13,7 @@ from paraflex.arrays import Array, Mask
 from paraflex.campaign import OnProgress, Study, Workers
 from paraflex.designs.run import STATUS_COMPLETE, RunTask, run_task
 from paraflex.designs.samples import RANDOM
-from paraflex.designs.schema import SamplingTable, study_table
+from paraflex.designs.schema import SamplingTable, StudyFile, study_table
 from paraflex.designs.sweep import SweepStudy, SweptResult, make_study
 from paraflex.errors import InputError, optional_package, suggestion
 from paraflex.limits import DESIGNS, at_most
@@ -120,13 +120,13 @@ class IndicesStudy(Study[IndicesResult]):
 
 @checked_arguments()
 def load_indices(
-    file: str | Path, metrics: list[str] | None = None, samples: int | None = None, seed: int | None = None
+    file: StudyFile, metrics: list[str] | None = None, samples: int | None = None, seed: int | None = None
 ) -> IndicesStudy:
     """Read a study of Sobol indices from the file of a sweep or an optimisation with ranges for all parameters.
 
     Parameters
     ----------
-    file : str or Path
+    file : str, Path or mapping
         Study file, TOML.
     metrics : list of str, optional
         Metrics whose variance is analysed; by default those of the file.
@@ -163,7 +163,7 @@ def load_indices(
 
 @checked_arguments()
 def indices(
-    study: IndicesStudy | str | Path,
+    study: IndicesStudy | StudyFile,
     folder: str | Path,
     *,
     workers: Workers | int | None = None,
@@ -175,8 +175,8 @@ def indices(
 
     Parameters
     ----------
-    study : IndicesStudy, str or Path
-        Study, or its file.
+    study : IndicesStudy, str, Path or mapping
+        Study, its file, or the contents of one.
     folder, workers, on_progress
         See `Study.run`; an integer number of workers is a number of threads.
     run : callable, optional

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from paraflex.arrays import Array
+from paraflex.arrays import Array, Brief
 from paraflex.mechanism.quantities import known
 from .evaluate import EvaluatedDesign
 
@@ -13,7 +13,7 @@ WORST, MEAN = "worst", "mean"
 
 
 @dataclass(frozen=True)
-class Objective:
+class Objective(Brief):
     """Objective function, a weighted sum of metrics, with upper limits of metrics.
 
     Attributes

@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 from paraflex.arguments import checked_arguments, named_in_errors
 from paraflex.campaign import OnProgress, Workers
 from paraflex.designs.run import RunTask
-from paraflex.designs.schema import study_table
+from paraflex.designs.schema import StudyFile, study_table
 from paraflex.designs.units import check_unit_of_metric
 from paraflex.errors import InputError
 from paraflex.results.metrics import Members
@@ -80,12 +80,12 @@ class OptimisationStudy(SearchStudy[OptimisationResult]):
 
 
 @checked_arguments()
-def load_optimisation(file: str | Path) -> OptimisationStudy:
+def load_optimisation(file: StudyFile) -> OptimisationStudy:
     """Read the study file of an optimisation.
 
     Parameters
     ----------
-    file : str or Path
+    file : str, Path or mapping
         Study file, TOML; see docs/optimisation.md.
 
     Raises
@@ -109,7 +109,7 @@ def load_optimisation(file: str | Path) -> OptimisationStudy:
 
 @checked_arguments()
 def optimise(
-    study: OptimisationStudy | str | Path,
+    study: OptimisationStudy | StudyFile,
     folder: str | Path,
     *,
     workers: Workers | int | None = None,
@@ -120,8 +120,8 @@ def optimise(
 
     Parameters
     ----------
-    study : OptimisationStudy, str or Path
-        Study, or its file.
+    study : OptimisationStudy, str, Path or mapping
+        Study, its file, or the contents of one.
     folder, workers, on_progress
         See `Study.run`; an integer number of workers is a number of threads.
     run : callable, optional

@@ -19,9 +19,9 @@ from paraflex.figures.search import IDENTIFICATION
 from paraflex.files import model_from
 from paraflex.folders import check_listed
 from paraflex.formatting import quantity
-from paraflex.report import Page
-from paraflex.report.choice import MOST_RUNS, Picked, best_runs
-from paraflex.report.sweep import StudyAccount, VariedParameter, sweep_page
+from paraflex.reports import Page
+from paraflex.reports.choice import MOST_RUNS, Picked, best_runs
+from paraflex.reports.sweep import StudyAccount, VariedParameter, sweep_page
 from paraflex.results.findings import finding_lines
 from paraflex.results.metrics import VALIDITY
 from paraflex.writing import read_json

@@ -17,6 +17,7 @@ import numpy as np
 
 from paraflex.arguments import checked_arguments, named_in_errors
 from paraflex.arrays import ArrayLike
+from paraflex.display import Shown
 from paraflex.errors import InputError
 from paraflex.figures.charts import (
     Array,
@@ -31,6 +32,7 @@ from paraflex.figures.charts import (
 )
 from paraflex.folders import added_to
 from paraflex.formatting import logarithmic_number, shortened, typeset
+from paraflex.late import view
 from paraflex.plots.themes import THEMES
 from paraflex.units import DisplayUnit
 from paraflex.writing import write_text
@@ -48,7 +50,7 @@ _SCRIPTS = ("report.js", "designs.js", "charts.js", "player.js", "start.js")
 
 @named_in_errors("a page", "what tracking_page or motion_page returns")
 @dataclass(frozen=True)
-class Page:
+class Page(Shown):
     """Content of a report.
 
     Attributes
@@ -116,6 +118,17 @@ class Page:
     no_film: str = ""
     notes: Sequence[str] = ()
     remarks: Sequence[str] = ()
+
+    def save(self, path: str | Path) -> None:
+        """Write the page as an HTML file; see `save_page`."""
+        save_page(self, path)
+
+
+@view.register(Page)
+def page_html(page: Page) -> str:
+    """Return the page in a frame of its own, apart from the notebook's scripts and styles."""
+    style = "width: 100%; height: 45em; border: 0"
+    return f'<iframe srcdoc="{escape(render(page))}" sandbox="allow-scripts allow-downloads" style="{style}"></iframe>'
 
 
 @checked_arguments()
@@ -360,4 +373,4 @@ def _script_json(data: Mapping[str, Any]) -> str:
 
 
 def _asset(name: str) -> str:
-    return (files("paraflex.report") / "assets" / name).read_text(encoding="utf-8")
+    return (files("paraflex.reports") / "assets" / name).read_text(encoding="utf-8")

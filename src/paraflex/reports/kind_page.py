@@ -4,6 +4,7 @@ Reports of single kinds add to it what only they have.
 """
 
 from importlib import import_module
+from pathlib import Path
 
 import xarray as xr
 
@@ -16,6 +17,15 @@ from paraflex.results.kinds import kind_of
 from .page import Page
 from .provenance import asked, command_line, verdict_word
 from .text import sections
+
+
+def page_of(data: xr.Dataset, folder: Path) -> Page:
+    """Return the report of a dataset of any kind, and of the summary in its folder."""
+    kind = RESULT_KINDS[kind_of(data)]
+    kind.refuse("page", str(folder))
+    module, _, function = (kind.page or "kind_page.kind_page").partition(".")
+    page = getattr(import_module(f"paraflex.reports.{module}"), function)
+    return page(data, folder) if kind.with_folder else page(data)
 
 
 @checked_arguments()

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from paraflex.arrays import Array, NDArray
+from paraflex.arrays import Array, Brief, NDArray
 from paraflex.errors import InputError
 from paraflex.figures.shapes import figure_of
 from paraflex.plots.marks import DOT, LOOKS, Mark, key_arrow, moving_marks, still_marks
@@ -24,7 +24,7 @@ NO_SHAPES = (
 
 
 @dataclass(frozen=True)
-class Animation:
+class Animation(Brief):
     """Frames of all runs; with magnification m, bodies and symbols are drawn at `base + m (shape - base)`.
 
     Attributes

@@ -43,8 +43,7 @@ def verification_page(data: xr.Dataset, summary: Mapping[str, Any]) -> Page:
     check_kind(data, "verification")
     modes, models, run = names_of(data, "mode"), names_of(data, "model"), asked(data)
     names, reference = list(map(printed, models)), str(data.attrs["reference"])
-    page = kind_page(data)
-    extent = path_extent(data)
+    page, path, extent = kind_page(data), run.get("path"), path_extent(data)
     own = {mode: dict(zip(names, runs_of_mode(data, m), strict=True)) for m, mode in enumerate(modes)}
     tables = [model_table(summary, mode, extent, own.get(mode)) for mode in summary["modes"]]
     for mode in summary["modes"]:
@@ -52,7 +51,7 @@ def verification_page(data: xr.Dataset, summary: Mapping[str, Any]) -> Page:
     several = len(modes) > 1
     return replace(
         page,
-        subtitle=f"{len(models)} models of one mechanism, path “{run.get('path', '')}”, "
+        subtitle=f"{len(models)} models of one mechanism, {f'path “{path}”, ' if path else ''}"
         f"reference: {printed(reference)}",
         verdict=summary.get("verdict", {}).get("level", page.verdict),
         facts=[(name, value) for name, value in common_facts(data) if name != "integration"],
