@@ -9,7 +9,10 @@ from typing import TYPE_CHECKING, Any
 
 from paraflex import plots
 from paraflex.errors import InputError, suggestion
-from paraflex.figures.entry import Figure as CatalogueFigure
+from paraflex.figures.abscissae import find_abscissa
+from paraflex.figures.catalogue import is_of_runs
+from paraflex.figures.charts import TIME
+from paraflex.figures.entry import Figure as CatalogueFigure, prepared
 from paraflex.figures.selection import default_mode, names_of, place_of, point_number, prototype_pair
 from .catalogue import CATALOGUE, figure_names
 
@@ -76,6 +79,7 @@ def drawings(
     modes: Sequence[str] = (),
     metrics: Sequence[str] = (),
     points: Sequence[str] = (),
+    over: str = TIME.name,
 ) -> list[PlannedFigure]:
     """Plan a figure of some results: one drawing, or one for each mode, run or point.
 
@@ -91,6 +95,8 @@ def drawings(
         Metrics, for figures of many designs; by default the first that vary.
     points : sequence of str
         Named points to show; by default the end-effector, or those that travel most.
+    over : str
+        Abscissa of curves over time, see `figures.abscissae`.
 
     Returns
     -------
@@ -99,9 +105,17 @@ def drawings(
     Raises
     ------
     InputError
-        There is no such mode or point, or the figure does not show points.
+        There is no such mode, point or abscissa, or the figure does not show points or has no curves over time.
     """
     figures = _of_modes(source, figure, modes, metrics)
+    if over != TIME.name:
+        if not has_curves_over_time(source, figure):
+            problem, remedy = f"{figure.name} has no curves over time", "leave it out, or choose another figure"
+            raise InputError(problem, field="--over", value=over, remedy=remedy)
+        find_abscissa(prepared(source.data), over, "--over")
+        chosen: dict[str, Any] = {"over": over}
+        figures = [PlannedFigure(figure, f"{one.of}_over_{over}".lstrip("_"), partial(one.draw, **chosen))
+                   for one in figures]  # fmt: skip
     if not points:
         return figures
     if not figure.points:
@@ -117,6 +131,13 @@ def drawings(
         shown = [(",".join(points), {"points": list(points)})]
     return [PlannedFigure(figure, "_".join(filter(None, (one.of, named))), partial(one.draw, **chosen))
             for one in figures for named, chosen in shown]  # fmt: skip
+
+
+def has_curves_over_time(source: Source, figure: CatalogueFigure) -> bool:
+    """Return whether a figure of some results has curves over time, which may be over another quantity."""
+    if figure.charts is None or not is_of_runs(figure.name):
+        return False
+    return any(chart.over_time for chart in figure.charts(prepared(source.data)))
 
 
 def _of_modes(

@@ -18,6 +18,7 @@ import numpy as np
 from paraflex.arguments import checked_arguments, named_in_errors
 from paraflex.arrays import ArrayLike
 from paraflex.errors import InputError
+from paraflex.figures.abscissae import Abscissa
 from paraflex.figures.charts import (
     Array,
     Axis,
@@ -76,6 +77,8 @@ class Page:
         Charts over time or of single runs.
     time : (k,) array
         Abscissae of curves without x; empty if nothing moves.
+    abscissae : sequence of Abscissa
+        Quantities over which the reader may see the charts over time.
     runs : sequence of str
         Names of the runs that can be selected.
     groups : sequence of (str, int)
@@ -108,6 +111,7 @@ class Page:
     designs: Designs | None = None
     panels: Sequence[Panel] = ()
     time: ArrayLike = ()
+    abscissae: Sequence[Abscissa] = ()
     runs: Sequence[str] = ()
     groups: Sequence[tuple[str, int]] = ()
     selecting: str = "mode"
@@ -192,6 +196,7 @@ def _data(page: Page) -> dict[str, Any]:
 
     return {
         "time": time,
+        "abscissae": [_abscissa(one, series) for one in page.abscissae],
         "runs": list(page.runs),
         "groups": [list(group) for group in page.groups],
         "selecting": page.selecting,
@@ -208,6 +213,13 @@ def _data(page: Page) -> dict[str, Any]:
 def _fields(thing: Any, *left_out: str) -> dict[str, Any]:
     """Return the fields of a dataclass, except some, as a dict."""
     return {one.name: getattr(thing, one.name) for one in fields(thing) if one.name not in left_out}
+
+
+def _abscissa(one: Abscissa, series: Series) -> dict[str, Any]:
+    """Return an abscissa for the scripts, in the unit in which it is shown, with the row of each run."""
+    unit = one.axis.unit_for(one.values)
+    rows = [series.add(unit.factor * each) for each in one.values]
+    return {"name": one.axis.name, "label": one.axis.label(unit), "rows": rows}
 
 
 def _chart(chart: Chart, series: Series, time: int) -> dict[str, Any]:

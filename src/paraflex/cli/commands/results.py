@@ -77,6 +77,10 @@ class PlotRequest:
         "--point BODY.POINT",
         "Named point in place of the end-effector; repeatable. With all: in figures that show points.",
     )
+    over: str = option(
+        "--over NAME", 'Abscissa of curves over time: a joint, or "BODY.POINT.x". With all: of figures that have any.',
+        default="time",
+    )  # fmt: skip
     style: str | None = option("--style single|double", "Width of one or two columns. Default: what suits each figure.")
     format: str = option("--format pdf,svg,png", "One or several formats.", default="pdf")
     output: str | None = option("--output --out DIR", "Folder. Default: figures/ in RESULTS.")
