@@ -142,6 +142,9 @@ fonts are embedded in PDF as TrueType. Colours are those of Okabe and Ito, and l
 prints in grey and for colour-blind readers. Files are written to `figures/` in the folder of the results, or to
 `--output`. Existing files are replaced only with `--force`.
 
+The option `--units deg,mm,kN` chooses the units on the axes, and so does the table
+[`[units]`](model-file-tables.md#units) of the model's file.
+
 The option `--over` draws curves over the angle or travel of a joint, or over a coordinate of a point, in place of
 time. With it, `all` or no figure stands for all figures with curves over time:
 

@@ -118,7 +118,7 @@ def test_runs_of_all_models_are_numbered_mode_by_mode():
 @pytest.mark.parametrize(
     ("name", "words"),
     [
-        ("crank.O.x", "over: does not move in these results (got 'crank.O.x'); choose from time, O, A, B, Q"),
+        ("crank.O.x", "over: does not move in these results (got 'crank.O.x'); one of time, O, A, B, Q"),
         ("crank.A", "over: no joint or coordinate of a point with this name in these results (got 'crank.A'); "
                     'write "crank.A.x" or "crank.A.y"'),
         ("rocker.Bx", 'did you mean "rocker.B.x"?'),

@@ -95,7 +95,7 @@ def test_every_command_with_a_mechanism_takes_both():
 
 
 # Options that say where results go and how they are shown.
-SHOWN = {"out", "force", "figures", "report", "json"}
+SHOWN = {"out", "force", "figures", "report", "json", "units"}
 
 
 def asked_for(tmp_path, *line):

@@ -7,9 +7,10 @@ import typer
 
 from paraflex.errors import InputError, suggestion
 from paraflex.figures.charts import TIME
-from paraflex.plots.planned import drawings, figures_of, find_figure, has_curves_over_time
+from paraflex.plots.planned import drawings, figures_of, find_figure
 from paraflex.plots.sources import Source, open_source
 from .commands.results import PlotRequest
+from .tables import in_own_units
 
 ALL = "all"
 STYLES = ("single", "double")
@@ -21,6 +22,7 @@ def plot_command(request: PlotRequest) -> None:
     """Draw the requested figures and print their files, or list the available ones."""
     _check(request)
     source = open_source(request.results)
+    in_own_units(source.data)
     moved = request.over != TIME.name
     if request.only_list or not (request.figures or moved):
         _list(source, request.results)
@@ -28,7 +30,7 @@ def plot_command(request: PlotRequest) -> None:
     if request.figures in ([ALL], []):
         every = figures_of(source)
         chosen = [one for one in every if one.points or not request.points] or every
-        chosen = [one for one in chosen if not moved or has_curves_over_time(source, one)] or chosen[:1]
+        chosen = [one for one in chosen if not moved or one.is_over_time(source.data)] or chosen[:1]
     else:
         chosen = list(dict.fromkeys(find_figure(source, name) for name in request.figures))
     requested = (request.modes, request.metrics, request.points, request.over)

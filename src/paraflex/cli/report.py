@@ -11,7 +11,7 @@ from paraflex.report import Page, save_page
 from paraflex.results.kinds import kind_of
 from paraflex.results.storage import open_results, results_file
 from .commands.results import ReportRequest
-from .tables import PlainConsole
+from .tables import PlainConsole, in_own_units
 
 
 def report_command(request: ReportRequest) -> None:
@@ -24,7 +24,7 @@ def report_command(request: ReportRequest) -> None:
     if target.exists() and not request.force:
         raise InputError("already exists", field=str(target), remedy="give --force to overwrite it, or --output FILE")
     if study is None:
-        save_page(page_of(open_results(file), file.parent), target)
+        save_page(page_of(in_own_units(open_results(file)), file.parent), target)
     else:
         save_study_report(study, PlainConsole(stderr=True), target)
     PlainConsole(stderr=True).print_lines(f"report in {target}")

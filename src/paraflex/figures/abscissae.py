@@ -71,13 +71,10 @@ def _of_runs(array: xr.DataArray, *dims: str) -> Array:
 def offered(data: xr.Dataset) -> list[Abscissa]:
     """Return the abscissae that a page offers: joints that move, and coordinates of the points that travel most."""
     found, joints = [one for one in abscissae(data) if one.moves], names_of(data, "joint") if "joint" in data else []
-    ends = [""]
-    if "point_position" in data:
-        # In a verification, the points of its first model.
-        first, points = data.isel(model=0) if "model" in data.dims else data, names_of(data, "point")
-        ends = [f"{points[k]}." for k in moving_points(first)]
+    points = names_of(data, "point") if "point_position" in data else []
+    ends = tuple(f"{points[k]}." for k in moving_points(data)) if points else ""
     turning = [one for one in found if one.name in joints][:_MOST_JOINTS]
-    return turning + [one for one in found if one.name not in joints and one.name.startswith(tuple(ends))]
+    return turning + [one for one in found if one.name not in joints and one.name.startswith(ends)]
 
 
 def find_abscissa(data: xr.Dataset, name: str, field: str = "over") -> Abscissa:
@@ -89,25 +86,18 @@ def find_abscissa(data: xr.Dataset, name: str, field: str = "over") -> Abscissa:
         remedy = f'write "{name}.x" or "{name}.y"' if f"{name}.x" in found else suggestion(name, moving)
         raise InputError(problem, field=field, value=name, remedy=remedy)
     if not found[name].moves:
-        remedy = f"choose from {listed(moving)}"
-        raise InputError("does not move in these results", field=field, value=name, remedy=remedy)
+        raise InputError("does not move in these results", field=field, value=name, remedy=f"one of {listed(moving)}")
     return found[name]
 
 
 def drawn_over(charts: Iterable[Chart], data: xr.Dataset, name: str) -> list[Chart]:
     """Return charts over another abscissa than time, see `find_abscissa`; those that are not over time are unchanged.
 
-    Desired values are drawn over the abscissa of a run at the same time.
-
-    Raises
-    ------
-    InputError
-        No chart is over time, the results have no such abscissa, or it does not move.
+    Desired values are drawn over the abscissa of a run at the same time. Raise InputError if no chart is over time.
     """
     charts = list(charts)
     if not any(chart.over_time for chart in charts):
-        remedy = "leave it out, or choose another figure"
-        raise InputError("this figure has no curves over time", field="over", value=name, remedy=remedy)
+        raise InputError("this figure has no curves over time", field="over", value=name, remedy="leave it out")
     found, time = find_abscissa(data, name), data["time"].values
     return [replace(chart, x=found.axis, spans=(), curves=list(_curves(chart, found.values, time)))
             if chart.over_time else chart for chart in charts]  # fmt: skip

@@ -31,13 +31,6 @@ def all_figures() -> Mapping[str, Figure]:
     return {name: one for kind in RESULT_KINDS for name, one in figures_of_kind(kind).items()}
 
 
-@cache
-def is_of_runs(name: str) -> bool:
-    """Return whether a figure is of runs, whose curves may be over another quantity than time."""
-    kinds = (one for one in RESULT_KINDS.values() if one.producers and one.along and one.along[0] == "time")
-    return any(name in figures_of_kind(kind.name) for kind in kinds)
-
-
 def page_panels(kind: str, data: Any, names: Container[str] | None = None) -> list[Panel]:
     """Return the charts of a report, those of one heading together, in the order of the catalogue.
 

@@ -247,15 +247,7 @@ def point_motions(data: xr.Dataset, points: Sequence[str] = ()) -> Iterator[Char
     panels="choices", members=4, height=33.0, variables=("point_velocity", "point_acceleration"),
 )  # fmt: skip
 def point_components(data: xr.Dataset, points: Sequence[str] = ()) -> Iterator[Chart]:
-    """Yield charts of both coordinates of position, velocity and acceleration of named points, one point at a time.
-
-    Parameters
-    ----------
-    data : xarray.Dataset
-        Results of a run.
-    points : sequence of str
-        Points "body.point" to plot; by default the end-effector and the points that travel most.
-    """
+    """Yield charts of x and y of position, velocity and acceleration of points, one at a time; see `point_motions`."""
     most, names, axes = _MOST_ROWS // data.sizes["mode"], names_of(data, "point"), names_of(data, "axis")
     shown = points_of(data, points, max(1, min(most, _MOST_POINTS)))
     for quantity, unit, symbol in (("position", "m", "r"), ("velocity", "m/s", "v"), ("acceleration", "m/s²", "a")):
@@ -287,13 +279,7 @@ def point_paths(data: xr.Dataset, points: Sequence[str] = ()) -> Iterator[Chart]
 @figure("hodographs: velocity of named points in y over that in x", heading=_POINTS, takes="mode", points="points",
         variables=("point_velocity",), defaults=lambda data: {"points": _few_points(data)})  # fmt: skip
 def hodographs(data: xr.Dataset, points: Sequence[str] = ()) -> Iterator[Chart]:
-    """Yield the chart of the hodographs of named points: the curves that the tips of their velocity vectors describe.
-
-    Parameters
-    ----------
-    points : sequence of str
-        Points "body.point" to plot; by default as in `point_paths`.
-    """
+    """Yield the chart of the hodographs of points, which the tips of their velocity vectors draw; see `point_paths`."""
     chart = Chart("hodographs", "Hodographs of points", Axis("velocity", "m/s", "y\u0307"),
                   x=Axis("velocity", "m/s", "x\u0307"), equal=True)  # fmt: skip
     yield _in_the_plane(chart, data, "point_velocity", points)
@@ -329,8 +315,8 @@ def moving_points(data: xr.Dataset, most: int = _MOST_POINTS) -> list[int]:
 
     They are at most `most`, those that travel most. Only one of coincident points is returned.
     """
-    places = data["point_position"].isel(mode=0).transpose("time", "point", "axis").values
-    names = names_of(data, "point")
+    first = data["point_position"].isel(mode=0, model=0, missing_dims="ignore")
+    places, names = first.transpose("time", "point", "axis").values, names_of(data, "point")
     travel = ranges(places).max(axis=1)
     # Coincident points share a line, named after the end-effector if it is one of them. Names of generated points
     # contain "._".

@@ -20,7 +20,7 @@ from paraflex.arguments import checked_arguments
 from paraflex.arrays import Array
 from paraflex.errors import InputError
 from paraflex.figures.abscissae import drawn_over
-from paraflex.figures.catalogue import all_figures, is_of_runs
+from paraflex.figures.catalogue import all_figures
 from paraflex.figures.charts import TIME, Axis, Chart, Curve, is_logarithmic, joined, symmetrical_numbers
 from paraflex.figures.entry import Figure as CatalogueFigure, prepared
 from paraflex.figures.selection import default_mode, names_of, prototype_pair
@@ -137,7 +137,8 @@ def plotting_function(name: str) -> Callable[..., Figure]:
     more = [inspect.Parameter(one, inspect.Parameter.POSITIONAL_OR_KEYWORD, default=None, annotation=kinds[one])
             for one in chosen]  # fmt: skip
     abscissa = inspect.Parameter("over", inspect.Parameter.KEYWORD_ONLY, default=TIME.name, annotation=str)
-    shown = inspect.Signature([own[0], *more, *own[1:], *([abscissa] if is_of_runs(name) else [])])
+    last = [abscissa] if entry.takes in ("results", "mode", "models") else []
+    shown = inspect.Signature([own[0], *more, *own[1:], *last])
 
     def plot(*args: Any, **given: Any) -> Figure:
         options = shown.bind(*args, **given).arguments

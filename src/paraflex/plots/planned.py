@@ -10,7 +10,6 @@ from typing import TYPE_CHECKING, Any
 from paraflex import plots
 from paraflex.errors import InputError, suggestion
 from paraflex.figures.abscissae import find_abscissa
-from paraflex.figures.catalogue import is_of_runs
 from paraflex.figures.charts import TIME
 from paraflex.figures.entry import Figure as CatalogueFigure, prepared
 from paraflex.figures.selection import default_mode, names_of, place_of, point_number, prototype_pair
@@ -109,9 +108,9 @@ def drawings(
     """
     figures = _of_modes(source, figure, modes, metrics)
     if over != TIME.name:
-        if not has_curves_over_time(source, figure):
-            problem, remedy = f"{figure.name} has no curves over time", "leave it out, or choose another figure"
-            raise InputError(problem, field="--over", value=over, remedy=remedy)
+        if not figure.is_over_time(source.data):
+            problem = f"{figure.name} has no curves over time"
+            raise InputError(problem, field="--over", value=over, remedy="leave it out")
         find_abscissa(prepared(source.data), over, "--over")
         chosen: dict[str, Any] = {"over": over}
         figures = [PlannedFigure(figure, f"{one.of}_over_{over}".lstrip("_"), partial(one.draw, **chosen))
@@ -131,13 +130,6 @@ def drawings(
         shown = [(",".join(points), {"points": list(points)})]
     return [PlannedFigure(figure, "_".join(filter(None, (one.of, named))), partial(one.draw, **chosen))
             for one in figures for named, chosen in shown]  # fmt: skip
-
-
-def has_curves_over_time(source: Source, figure: CatalogueFigure) -> bool:
-    """Return whether a figure of some results has curves over time, which may be over another quantity."""
-    if figure.charts is None or not is_of_runs(figure.name):
-        return False
-    return any(chart.over_time for chart in figure.charts(prepared(source.data)))
 
 
 def _of_modes(

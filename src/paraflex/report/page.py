@@ -196,7 +196,8 @@ def _data(page: Page) -> dict[str, Any]:
 
     return {
         "time": time,
-        "abscissae": [_abscissa(one, series) for one in page.abscissae],
+        "abscissae": [{"name": axis.name, "label": axis.label(unit), "rows": [series.add(unit.factor * x) for x in row]}
+                      for _, axis, row, _ in page.abscissae for unit in [axis.unit_for(row)]],
         "runs": list(page.runs),
         "groups": [list(group) for group in page.groups],
         "selecting": page.selecting,
@@ -207,19 +208,12 @@ def _data(page: Page) -> dict[str, Any]:
         "film": None if page.film is None else page.film.to_dict(),
         "palettes": {name: look.links for name, look in THEMES.items()},
         "series": series.to_dict(),
-    }
+    }  # fmt: skip
 
 
 def _fields(thing: Any, *left_out: str) -> dict[str, Any]:
     """Return the fields of a dataclass, except some, as a dict."""
     return {one.name: getattr(thing, one.name) for one in fields(thing) if one.name not in left_out}
-
-
-def _abscissa(one: Abscissa, series: Series) -> dict[str, Any]:
-    """Return an abscissa for the scripts, in the unit in which it is shown, with the row of each run."""
-    unit = one.axis.unit_for(one.values)
-    rows = [series.add(unit.factor * each) for each in one.values]
-    return {"name": one.axis.name, "label": one.axis.label(unit), "rows": rows}
 
 
 def _chart(chart: Chart, series: Series, time: int) -> dict[str, Any]:

@@ -73,7 +73,6 @@ const begin = (() => {
     const select = byId("over");
     byId("has-over").hidden = !page.abscissae.length;
     ["time", ...page.abscissae.map((one) => one.name)].forEach((name, k) => select.append(new Option(name, k)));
-    select.value = "0";
     select.addEventListener("change", () => report.set("over", Number(select.value)));
   }
 
