@@ -17,7 +17,7 @@ from pathlib import Path
 
 from paraflex.figures.entry import Figure as CatalogueFigure
 from paraflex.plots.catalogue import CATALOGUE
-from paraflex.plots.planned import drawings, figures_of
+from paraflex.plots.planned import drawings, figures_of, find_figure
 from paraflex.plots.save import write_figures
 from paraflex.plots.sources import Source, open_source
 
@@ -133,7 +133,8 @@ paraflex plot RESULTS FIGURE... --style single --format pdf,svg,png
 `RESULTS` is the folder that a command wrote, or one of its files. Without a figure, or with `--list`, the command
 lists the figures of these results; `all` draws all of them. Figures that show one actuation mode are drawn for each
 `--mode`; the others show the selected modes, or all. Figures of many designs accept `--metric`. Figures of the
-end-effector's motion, of trails and of points accept `--point link1.B1`.
+end-effector's motion, of trails and of points accept `--point link1.B1`; `point_paths`, `hodographs` and
+`point_components` show several points if the option is repeated.
 
 The option `--style single` makes figures 84 mm wide, one column of most journals, and `--style double` 174 mm, two
 columns. Panels that do not fit side by side are placed below one another. Text is 8 pt, numbers on axes are 7 pt;
@@ -156,6 +157,34 @@ options do the same for one command:
 
 Sizes of names in drawings of mechanisms and in films do not depend on these settings, nor do their colours.
 
+The option `--units deg,mm,kN` chooses the units on the axes, and so does the table
+[`[units]`](model-file-tables.md#units) of the model's file.
+
+The option `--over` draws curves over the angle or travel of a joint, or over a coordinate of a point, in place of
+time. With it, `all` or no figure stands for all figures with curves over time:
+
+```sh
+paraflex plot motion joint_forces --over O
+paraflex plot tracking link_motions energies --over link4.C.x
+```
+
+<div class="gallery" markdown>
+
+<figure id="over" markdown>
+[![Joint forces of a four-bar over the angle of its crank.](images/gallery/over.png)](images/gallery/over.png)
+
+<figcaption markdown>
+Forces in the joints of a four-bar over the angle of its crank.
+
+`pf.plots.joint_forces(data, over="O")`
+</figcaption>
+</figure>
+
+</div>
+
+Desired values are drawn at the angle, travel or coordinate that the run has at the same time. A joint or coordinate
+that does not move is refused, and so is a figure without curves over time.
+
 In Python, each figure is a function of `paraflex.plots` that takes results or their folder:
 
 ```python
@@ -164,6 +193,7 @@ import paraflex as pf
 data = pf.load_results("results/results.nc")
 pf.plots.tracking_errors(data).savefig("errors.pdf")
 pf.plots.link_motions(data, "++++").savefig("links.pdf")
+pf.plots.link_motions(data, "++++", over="A1").savefig("links_over_A1.pdf")
 ```
 
 Settings apply while a figure is made, and while it is written: `with plt.rc_context({"font.family": "serif"}):` holds
@@ -189,6 +219,8 @@ def main() -> None:
                 raise SystemExit(f"{source.folder} holds results of kind {source.kind}, not {kind}")
             for figure in first_shown(kind):
                 draw(figure, source)
+            if kind == "motion":
+                draw(find_figure(source, "joint_forces"), source, over="O")
     (DOCS / "gallery.md").write_text(gallery_page(), encoding="utf-8")
 
 
@@ -261,14 +293,14 @@ def command_line(command: list[str], kind: str) -> str:
     return " ".join(["paraflex", *quoted]) + (" > modes.json" if kind == "modes" else "")
 
 
-def draw(figure: CatalogueFigure, source: Source) -> None:
-    """Draw a figure and write its picture."""
+def draw(figure: CatalogueFigure, source: Source, over: str = "time") -> None:
+    """Draw a figure, over time or another abscissa, and write its picture."""
     if figure not in figures_of(source):
         raise SystemExit(f"{figure.name} cannot be drawn of {source.folder}")
-    drawing = drawings(source, figure)[0]
+    drawing = drawings(source, figure, over=over)[0]
     (file,) = write_figures([drawing], IMAGES, ["png"], dpi=110.0, force=True)
     shrink(file)
-    file.rename(file.with_name(f"{figure.name}.png"))
+    file.rename(file.with_name(f"{figure.name if over == 'time' else 'over'}.png"))
 
 
 def shrink(file: Path) -> None:

@@ -96,7 +96,7 @@ def test_every_command_with_a_mechanism_takes_both():
 
 
 # Options that say where results go and how they are shown.
-SHOWN = {"out", "force", "figures", "report", "json"}
+SHOWN = {"out", "force", "figures", "report", "json", "units"}
 # It is repeated by the names of its modes.
 NAMED = {"servo"}
 

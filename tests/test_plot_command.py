@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Callable
 from dataclasses import replace
 from functools import cache
@@ -76,6 +77,12 @@ FILES = {
     "modes": "",
 }
 
+# Quantities without a unit: ratios, counts, and parameters and metrics of the study that is made up.
+PLAIN = {
+    "condition number", "condition number, worst along the path", "number", "accepted steps", "states", "design",
+    "objective", "root mean square residual", "share of the variance", "largest relative error", "error",
+    "reached / target",
+}  # fmt: skip
 # Figures without axes.
 PICTURES = ("mechanism_drawing", "mode_shapes", "deformed_shapes", "buckling_shapes")
 
@@ -211,6 +218,7 @@ def test_every_figure_of_every_kind_at_both_widths(
         stays_on_the_page(figure)
         labels = [text for axes in figure.axes for text in (axes.get_xlabel(), axes.get_ylabel())]
         assert any(labels) or name in ("parallel_coordinates", *PICTURES)
+        assert {text for text in labels if text and not re.search(r" ?\[.+\]$", text)} <= PLAIN, name
 
 
 def test_catalogue_and_package_have_the_same_figures() -> None:

@@ -562,3 +562,28 @@ def test_a_browser_that_died_is_started_again(browser, shared):
         browser.alive().new_browser_cdp_session().send("Browser.crash")
     assert before.is_closed()
     assert shared().locator("#canvas").is_visible()
+
+
+def test_charts_over_time_are_over_what_the_reader_chooses(shared):
+    """The curve of the selected mode is over its own coordinate, marked at the time of the animation."""
+    page, data = shared(), tracked()
+    page.locator("#chart-energies").scroll_into_view_if_needed()
+    names = page.locator("#over option").all_inner_texts()
+    assert names[0] == "time"
+    page.select_option("#over", label="angle of A₁")
+    page.evaluate("report.set('time', 0.04)")
+    wait_for_drawing(page)
+    plot = "document.querySelector('#chart-energies .js-plotly-plot')"
+    run = page.evaluate("report.state.run")
+    angle = data["joint_coordinate"].sel(joint="A1").values[run]
+    assert page.evaluate(f"{plot}._fullLayout.xaxis.title.text") == "angle of A₁ [rad]"
+    assert page.evaluate(f"Array.from({plot}.data[0].x)") == pytest.approx(angle, rel=1e-4)
+    place = f"{plot}._fullLayout.xaxis.d2p({angle[20]}) + {plot}._fullLayout.xaxis._offset"
+    dot = "document.querySelector('#chart-energies .dot').style.transform.match(/[0-9.]+/)[0]"
+    assert page.evaluate(f"Number({dot}) - ({place})") == pytest.approx(0.0, abs=0.5)
+    assert page.evaluate("document.querySelector('#chart-energies .cursor').style.visibility") == "hidden"
+    assert page.evaluate(f"{plot}._fullLayout.shapes.length") == 0
+    page.select_option("#over", label="time")
+    wait_for_drawing(page)
+    assert page.evaluate(f"Array.from({plot}.data[0].x)") == pytest.approx(data["time"].values, abs=1e-6)
+    assert page.evaluate("document.querySelector('#chart-energies .dot').style.visibility") == "hidden"

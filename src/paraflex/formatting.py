@@ -6,12 +6,15 @@
 import math
 import re
 import sys
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
+from functools import cache
 
 import numpy as np
 
 from .arrays import ArrayLike
-from .units import STRESS, DisplayUnit
+from .errors import InputError
+from .units import QUANTITIES, STRESS, DisplayUnit, unit_named, unit_of, unknown_unit
 
 # Text for a value that does not exist.
 NO_VALUE = "-"
@@ -23,6 +26,7 @@ _ROUNDING = 16.0 * sys.float_info.epsilon
 ROUNDING = 1e-12
 
 _RAISED = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+_UNRAISED = {ord("²"): "^2", ord("³"): "^3"}
 _LOWERED = str.maketrans("0123456789", "₀₁₂₃₄₅₆₇₈₉")
 GREEK = {
     "alpha": "α", "beta": "β", "gamma": "γ", "delta": "δ", "theta": "θ", "phi": "φ", "psi": "ψ", "tau": "τ",
@@ -39,6 +43,8 @@ _GROUPED = 5
 # Numbers within a text, with the parts that are typeset.
 _WRITTEN = re.compile(r"(?<![\w.])(-)?(\d+(?:\.\d*)?)(?:e([+-]\d+))?(?![\w])")
 
+# Output units that a user has chosen, by quantity.
+_output: dict[str, DisplayUnit] = {}
 _PREFIXES = {
     "m": (DisplayUnit("mm", 1e3), DisplayUnit("µm", 1e6), DisplayUnit("nm", 1e9)),
     "rad": (DisplayUnit("rad", 1.0), DisplayUnit("mrad", 1e3), DisplayUnit("µrad", 1e6)),
@@ -170,6 +176,8 @@ def display_unit(unit: str, values: ArrayLike) -> DisplayUnit:
     Other units are returned unchanged.
     """
     largest, choices = peak(values), display_units(unit)
+    if len(choices) == 1:
+        return choices[0]
     if largest == 0.0:
         return next(choice for choice in choices if choice.name not in _LEAST_OF)
     fits = (one for one in choices if largest * one.factor >= _LEAST_OF.get(one.name, _LEAST))
@@ -182,15 +190,75 @@ def axis_unit(unit: str, values: ArrayLike) -> DisplayUnit:
     Numbers without a unit up to 2e9 are "in 10⁹".
     """
     shown, size = display_unit(unit, values), peak(values)
-    if unit in _PREFIXES or size == 0.0 or 1e-3 <= size < 1e5:
+    if unit in _PREFIXES or shown.name != unit or size == 0.0 or 1e-3 <= size < 1e5:
         return shown
     exponent = 3 * math.floor(math.log10(size) / 3.0)
     return DisplayUnit(f"10{raised(exponent)} {'' if unit == '1' else shown.name}".rstrip(), 10.0**-exponent)
 
 
 def display_units(unit: str) -> tuple[DisplayUnit, ...]:
-    """Return all units in which a quantity of an SI unit may be shown, the largest first."""
-    return _PREFIXES.get(unit, (DisplayUnit(unit[:LONGEST], 1.0),))
+    """Return all units in which a quantity of an SI unit may be shown, the largest first: its output unit alone."""
+    chosen = bool(_output) and _quantity_in(unit) in _output
+    return _PREFIXES[unit] if unit in _PREFIXES and not chosen else (output_unit(unit),)
+
+
+def output_unit(unit: str) -> DisplayUnit:
+    """Return the output unit of quantities with an SI unit, see `output_units`; the SI unit if there is none."""
+    chosen = _output.get(_quantity_in(unit)) if _output else None
+    return chosen or DisplayUnit(unit[:LONGEST], 1.0)
+
+
+@cache
+def _quantity_in(unit: str) -> str:
+    """Return the one of `QUANTITIES` that has a unit; empty if there is none."""
+    found = unit_of(unit.translate(_UNRAISED))
+    # Frequencies have the dimension of rates of decay.
+    known = (name for name, si in QUANTITIES.items() if found and unit_named(si).dimension == found.dimension)
+    return next((name for name in known if name != "frequency" or "Hz" in unit), "")
+
+
+@contextmanager
+def output_units(units: Iterable[str], field: str = "units") -> Iterator[None]:
+    """Show quantities in units such as "deg" and "mm" within a context, in tables, figures, reports and CSV files.
+
+    It holds for the process. Other quantities are shown in units in which they have few digits; data stay in SI units.
+    Errors are those of `checked_units`.
+    """
+    before, chosen = dict(_output), checked_units((("", unit.strip()) for unit in units), field)
+    try:
+        _output.update(chosen)
+        yield
+    finally:
+        _output.clear()
+        _output.update(before)
+
+
+def prefer_units(units: Mapping[str, str]) -> None:
+    """Set output units by quantity, as [units] of a model's file has them, for quantities that have none."""
+    _output.update(checked_units(units.items()) | _output)
+
+
+def checked_units(units: Iterable[tuple[str, str]], field: str = "units") -> dict[str, DisplayUnit]:
+    """Return output units by quantity, from pairs of a quantity ("length"; "" for any) and a unit of it.
+
+    Raise InputError if a unit is unknown, is not one of the quantity or of any, or is the second one of its quantity.
+    """
+    out: dict[str, DisplayUnit] = {}
+    for name, unit in units:
+        found = _quantity_in(unit)
+        if unit_of(unit) is None:
+            problem = "no such unit"
+            remedy = (unknown_unit(f"1 {unit}") or ("", 'write a unit such as "mm", "deg/s" or "kN"'))[1]
+        elif not found or name not in ("", found):
+            problem = f"not a unit of {name or 'a quantity that is shown'}"
+            remedy = f'write "{QUANTITIES[name]}"' if name else f"choose from units of {', '.join(QUANTITIES)}"
+        elif found in out:
+            problem, remedy = f"a second unit of {found} beside {out[found].name}", "leave one of them out"
+        else:
+            out[found] = DisplayUnit(unit, 1.0 / unit_named(unit).in_si("1"))
+            continue
+        raise InputError(problem, field=f"{field}.{name}".rstrip("."), value=unit, remedy=remedy)
+    return out
 
 
 def common_unit(unit: str, values: Iterable[float | None] | ArrayLike, *, beside: float = 0.0) -> DisplayUnit:

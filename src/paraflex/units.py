@@ -5,7 +5,7 @@ import re
 from difflib import get_close_matches
 from fractions import Fraction
 from functools import cache
-from typing import NamedTuple
+from typing import Literal, NamedTuple, get_args
 
 # Exponents of metre, kilogram, second, radian and ampere. Angles have a dimension, so that rpm differs from 1/s.
 Dimension = tuple[int, int, int, int, int]
@@ -180,6 +180,14 @@ FIELD_UNITS = (
     "N/m", "N/s", "m/s^2", "m^4", "m^2", "m/s", "rad/s", "rad/m", "rad", "Pa", "Hz", "1/s", "V s/rad", "V", "ohm", "m",
     "s", "N", "A", "H",
 )  # fmt: skip
+
+# Quantities that have an output unit, and their SI units.
+QuantityName = Literal[
+    "length", "angle", "time", "mass", "force", "torque", "stress", "velocity", "angular_velocity", "acceleration",
+    "angular_acceleration", "frequency", "stiffness", "angular_stiffness",
+]  # fmt: skip
+_SI = ("m", "rad", "s", "kg", "N", "N m", "Pa", "m/s", "rad/s", "m/s^2", "rad/s^2", "Hz", "N/m", "N m/rad")
+QUANTITIES: dict[str, str] = dict(zip(get_args(QuantityName), _SI, strict=True))
 
 # Units of travel, torque, stiffness and speed at a sliding joint, by their units at a revolute joint.
 WHERE_IT_SLIDES = {

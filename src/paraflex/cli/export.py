@@ -7,7 +7,7 @@ from paraflex.results import open_results
 from paraflex.results.export import export, export_table
 from .commands.requests import flagged
 from .commands.results import ExportRequest
-from .tables import PlainConsole
+from .tables import PlainConsole, in_own_units
 
 _TABLE = "results.parquet"
 
@@ -22,7 +22,7 @@ def export_command(request: ExportRequest) -> None:
         if table.name.endswith(".parquet") and table.is_file():
             files = export_table(table, output, request.to, force=request.force)
         else:
-            data = open_results(results)
+            data = in_own_units(open_results(results))
             files = export(data, output, request.to, shapes=request.shapes, force=request.force)
     console = PlainConsole(stderr=True)
     for file in files:

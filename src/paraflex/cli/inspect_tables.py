@@ -9,7 +9,7 @@ from rich.table import Table
 from paraflex.errors import listed
 from paraflex.files import generator_names
 from paraflex.findings import Level
-from paraflex.formatting import number
+from paraflex.formatting import labelled, number, output_unit
 from paraflex.mechanism import Mechanism, groups_of
 from .tables import PlainConsole, framed_table
 
@@ -88,7 +88,7 @@ def _counts(facts: dict[str, Any]) -> Table:
         ("redundant constraints", "redundant_constraints"),
         ("Gruebler's count (3 bodies - constraints)", "gruebler_count"),
         ("degrees of freedom (3 bodies - rank)", "degrees_of_freedom"),
-        ("total mass [kg]", "total_mass"),
+        (labelled("total mass", output_unit("kg").name), "total_mass"),
         ("assemblies", "assemblies"),
         *((words, words) for words in related),
         ("controllers", "controllers"),
@@ -97,7 +97,7 @@ def _counts(facts: dict[str, Any]) -> Table:
     ):
         # Empty rows of gears and the like are left out, as most mechanisms have none.
         if key in facts and (facts[key] or key not in (*related, "actuators", "prescribed", "loads", "controllers")):
-            value = facts[key]
+            value = facts[key] if key != "total_mass" else output_unit("kg").factor * facts[key]
             if key == "total_mass" and facts["payload"]:
                 table.add_row(label, f"{value:g}, including its payload")
                 table.add_row("payload", _payload(facts["payload"]))
@@ -144,15 +144,16 @@ def _print_drives(console: PlainConsole, facts: dict[str, Any]) -> None:
 
 
 def _links(facts: dict[str, Any]) -> Table:
-    headings = ("body", "kind", "length [m]", "mass [kg]", "elements", "coord.", "f1, f2, f3 [Hz]")
+    long, heavy, often = (output_unit(unit) for unit in ("m", "kg", "Hz"))
+    headings = ("body", "kind", f"length [{long.name}]", f"mass [{heavy.name}]", "elements", "coord.",
+                f"f1, f2, f3 [{often.name}]")  # fmt: skip
     table = framed_table("bodies, each held in its own frame", headings, right=range(2, 7))
     for link in facts["links"][:_LISTED]:
-        lowest = ", ".join(f"{f:.1f}" for f in link["frequencies_hz"][:_FREQUENCIES_SHOWN])
-        length = "" if link["length"] is None else f"{link['length']:g}"
+        lowest = ", ".join(f"{often.factor * f:.1f}" for f in link["frequencies_hz"][:_FREQUENCIES_SHOWN])
+        length = "" if link["length"] is None else f"{long.factor * link['length']:g}"
         elements = "" if link["elements"] is None else str(link["elements"])
-        table.add_row(
-            link["name"], link["kind"], length, f"{link['mass']:.4f}", elements, str(link["coordinates"]), lowest
-        )
+        mass = f"{heavy.factor * link['mass']:.4f}"
+        table.add_row(link["name"], link["kind"], length, mass, elements, str(link["coordinates"]), lowest)
     if len(facts["links"]) > _LISTED:
         table.add_row(f"and {len(facts['links']) - _LISTED} more", "", "", "", "", "", "")
     return table

@@ -19,7 +19,7 @@ from paraflex.figures.reduction import reduced_words
 from paraflex.files import Model, StudyDefaults
 from paraflex.findings import DONE_STATUSES
 from paraflex.folders import RUN
-from paraflex.formatting import number, quantity
+from paraflex.formatting import number, output_unit, quantity
 from paraflex.integrators import IntegrationOptions
 from paraflex.mechanism import Mechanism
 from paraflex.motion import MotionRun, state_at
@@ -191,10 +191,10 @@ def _report(out: PlainConsole, summary: dict) -> None:
     # Points at which finite segments are connected by the program are left out.
     places = {point: at for point, at in final["point_position"].items() if None not in at and "._" not in point}
     wide = max((abs(x) for at in places.values() for x in at), default=0.0)
-    unknown = max(_ROUNDING * wide, summary["constraint_position_max"])
+    unknown, shown = max(_ROUNDING * wide, summary["constraint_position_max"]), output_unit("m")
     for point, position in list(places.items())[:_MOST_POINTS]:
         x, y = (0.0 if abs(each) < unknown else each for each in position)
-        out.print(f"  {point}: ({number(x, 6)}, {number(y, 6)}) m")
+        out.print(f"  {point}: ({number(x, 6, factor=shown.factor)}, {number(y, 6, factor=shown.factor)}) {shown.name}")
     if len(places) > _MOST_POINTS:
         out.print(f"  and {len(places) - _MOST_POINTS} more points in results.nc")
     passed = [number(t, 6) for t in summary["singular_positions"]]

@@ -6,9 +6,11 @@ from pathlib import Path
 import typer
 
 from paraflex.errors import InputError
+from paraflex.figures.charts import TIME
 from paraflex.plots.planned import drawings, figures_of, find_figure
 from paraflex.plots.sources import Source, open_source
 from .commands.results import PlotRequest
+from .tables import in_own_units
 
 ALL = "all"
 STYLES = ("single", "double")
@@ -20,14 +22,18 @@ def plot_command(request: PlotRequest) -> None:
     """Draw the requested figures and print their files, or list the available ones."""
     _check(request)
     source = open_source(request.results)
-    if request.only_list or not request.figures:
+    in_own_units(source.data)
+    moved = request.over != TIME.name
+    if request.only_list or not (request.figures or moved):
         _list(source, request.results)
         return
-    if request.figures == [ALL]:
-        chosen = [figure for figure in figures_of(source) if figure.points or not request.points] or figures_of(source)
+    if request.figures in ([ALL], []):
+        every = figures_of(source)
+        chosen = [one for one in every if one.points or not request.points] or every
+        chosen = [one for one in chosen if not moved or one.is_over_time(source.data)] or chosen[:1]
     else:
         chosen = list(dict.fromkeys(find_figure(source, name) for name in request.figures))
-    requested = (request.modes, request.metrics, request.points)
+    requested = (request.modes, request.metrics, request.points, request.over)
     drawn = [drawing for figure in chosen for drawing in drawings(source, figure, *requested)]
     # Matplotlib takes longer to import than everything up to here, so it is imported only now.
     from paraflex.plots.save import write_figures

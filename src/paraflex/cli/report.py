@@ -4,10 +4,10 @@ from pathlib import Path
 
 from paraflex.errors import InputError
 from paraflex.reports import save_page
-from paraflex.results.storage import results_file
+from paraflex.results.storage import open_results, results_file
 from paraflex.studies.report import report, study_of
 from .commands.results import ReportRequest
-from .tables import PlainConsole
+from .tables import PlainConsole, in_own_units
 
 
 def report_command(request: ReportRequest) -> None:
@@ -19,6 +19,8 @@ def report_command(request: ReportRequest) -> None:
         target = target / "report.html"
     if target.exists() and not request.force:
         raise InputError("already exists", field=str(target), remedy="give --force to overwrite it, or --output FILE")
+    if study is None:
+        in_own_units(open_results(file))
     console = PlainConsole(stderr=True)
     save_page(report(study or file, on_progress=console.print_lines), target)
     console.print_lines(f"report in {target}")

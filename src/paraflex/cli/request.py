@@ -11,6 +11,7 @@ from paraflex.errors import AssemblyError, InputError, UnreachablePathError, ren
 from paraflex.files import Model, load, load_path
 from paraflex.files.outside import may_be_outside
 from paraflex.files.overlay import value_of
+from paraflex.formatting import prefer_units
 from paraflex.mechanism import ActuationMode, Mechanism
 from paraflex.paths import Path as EndEffectorPath
 from paraflex.tracking import TrackingTask
@@ -30,7 +31,9 @@ def requested_model(choice: ModelChoice) -> Model:
         if not (name.strip() and equals):
             raise InputError("not FIELD=VALUE", field="--set", value=text, remedy='write "link1.length=0.3"')
         found[name.strip()] = value_of(value.strip())
-    return load(choice.name, set=found)
+    model = load(choice.name, set=found)
+    prefer_units(model.parameters.get("units", {}))
+    return model
 
 
 def command_provenance(model: Model, run: Mapping[str, Any]) -> dict[str, Any]:

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import json
 import textwrap
 from collections.abc import Container, Iterable, Iterator, Sequence
+from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
 from rich import box
@@ -13,6 +15,7 @@ from rich.table import Table
 
 from paraflex.errors import printable
 from paraflex.findings import Finding
+from paraflex.formatting import prefer_units
 from .collected import printed
 
 if TYPE_CHECKING:
@@ -21,6 +24,13 @@ if TYPE_CHECKING:
 
 # Gap between two columns, width at which headings are broken, and above which columns of words are [characters].
 _BETWEEN, _HEAD, _WRAPPED = 2, 9, 26
+
+
+def in_own_units(data: Any) -> Any:
+    """Return results, to be shown in the units of the [units] of their model's file unless others are chosen."""
+    with suppress(AttributeError, KeyError, TypeError, ValueError):
+        prefer_units(json.loads(data.attrs["parameters"])["model"]["units"])
+    return data
 
 
 class PlainConsole(Console):

@@ -5,16 +5,20 @@ from typing import Any
 
 from pydantic import BaseModel
 
-from paraflex.files.fields import Place, check_unit, field_at, units_at
+from paraflex.files.fields import Place, check_unit, field_at, leaves, units_at
 from paraflex.files.schema import ModelTable, NumberOfText
 from paraflex.results.metrics import Members, metric_unit
 from .schema import SweepTable
 
 
 def unit_of(data: Mapping[str, Any], place: Place) -> str:
-    """Return the unit of a number in a mechanism's file or a study's [integration]; empty unless there is one."""
-    units = units_at(_schema(place), data, place) or ()
-    return units[0] if len(units) == 1 else ""
+    """Return the unit of a number in a mechanism's file or a study's [integration]; empty unless there is one.
+
+    A parameter of a mechanism has the unit of the fields that are this parameter alone.
+    """
+    places = [at for at, value in leaves(data) if value == place[1]] if place[0] == "parameters" else [place]
+    found = {units for at in places if len(units := units_at(_schema(at), data, at) or ()) == 1}
+    return found.pop()[0] if len(found) == 1 else ""
 
 
 def check_unit_of(data: Mapping[str, Any], place: Place, text: str, field: str) -> None:

@@ -98,6 +98,12 @@ class Figure:
         """Check whether the results have the variables of the figure."""
         return all(name in data for name in self.variables)
 
+    def is_over_time(self, data: Any) -> bool:
+        """Check whether the figure has curves over the time of runs, which may be over another quantity of them."""
+        if self.charts is None or not isinstance(data, xr.Dataset) or "time" not in data.dims:
+            return False
+        return any(chart.over_time for chart in self.charts(prepared(data)))
+
     def is_written(self, data: Any) -> bool:
         """Check whether the command that makes the results writes the figure."""
         return bool(self.written_as) and all(name in data for name in self.written_with)

@@ -1,6 +1,6 @@
-"""Charts of a run without a path: angles, speeds and energies, generalised coordinates, paths of points."""
+"""Charts of a run without a path: angles, speeds and energies, generalised coordinates."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import replace
 
 import xarray as xr
@@ -8,7 +8,7 @@ import xarray as xr
 from paraflex.formatting import ROUNDING, peak, text_symbol
 from .charts import Axis, Chart, Curve, look
 from .entry import figure
-from .run_motion import ANGLE, ANGLES, RATES, energy_chart, moving_points, points_of
+from .run_motion import ANGLE, ANGLES, RATES, energy_chart
 from .runs import followed, ranges, stopped_runs
 from .selection import names_of
 
@@ -19,8 +19,6 @@ _KINDS = {
     "phi": ANGLE,
     "eta": Axis("modal coordinate", "m √kg", "η"),
 }
-# Largest number of points that a chart shows; results.nc has all.
-_MOST_POINTS = 60
 
 
 @figure("angles, speeds and energies", written_as="motion_overview", height=40.0)
@@ -29,32 +27,6 @@ def motion_overview(data: xr.Dataset) -> Iterator[Chart]:
     yield followed(ANGLES, data, data["angle"])
     yield followed(RATES, data, data["angular_velocity"])
     yield energy_chart(data)
-
-
-@figure("paths of named points in the plane", heading="Points", points="points",
-        defaults=lambda data: {"points": [names_of(data, "point")[k] for k in moving_points(data)]})  # fmt: skip
-def point_paths(data: xr.Dataset, points: Sequence[str] = ()) -> Iterator[Chart]:
-    """Yield the chart of the paths of named points in the plane.
-
-    Parameters
-    ----------
-    points : sequence of str
-        Points "body.point" to plot; by default all that move. The printed figure by default shows the end-effector and
-        the points that travel most, up to seven.
-    """
-    places = data["point_position"].isel(mode=0).transpose("point", "time", "axis").values
-    names = names_of(data, "point")
-    shown = points_of(data, points) if points else moving_points(data, _MOST_POINTS)
-    stopped = stopped_runs(data)[0]
-    curves = []
-    for k, one in enumerate(shown):
-        x, y = places[one].T
-        curves += [Curve(names[one], y, x, look(k), run=0, stopped=stopped),
-                   Curve("", y[:1], x[:1], look(k), mark="square")]  # fmt: skip
-    if not shown:
-        curves = [Curve("points, which do not move", places[:, 0, 1], places[:, 0, 0], look(0), mark="dot")]
-    yield Chart("points", "Paths of points", Axis("", "m", "y"), curves, Axis("", "m", "x"), equal=True,
-                on_page=bool(shown))  # fmt: skip
 
 
 @figure("generalised coordinates, including modal coordinates of bodies", heading="Coordinates", panels="choices",

@@ -67,7 +67,7 @@ def reduction_errors(data: xr.Dataset) -> Iterator[Chart]:
         for m in range(data.sizes["mode"]) for r, name in enumerate(names_of(data, "reduction"))
     ]  # fmt: skip
     yield Chart("errors", f"Error to the worst output, {data.attrs['kept_states']} states",
-                Axis("largest error over gain", log=True), curves, FREQUENCY, _choices(data), "mode",
+                Axis("largest relative error", log=True), curves, FREQUENCY, _choices(data), "mode",
                 spans=_beyond(data), levels=[float(data.attrs["accuracy"])], note=f"Wanted: {_wanted(data)}."
                 )  # fmt: skip
 

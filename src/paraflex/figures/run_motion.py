@@ -22,13 +22,15 @@ ENERGY = Axis("energy", "J", zero=True)
 _STILL_SHARE = 1e-3
 # Largest number of points that are shown where none are named.
 _MOST_POINTS = 7
+# Largest numbers of points whose paths a chart shows, and of points times runs whose components a page shows.
+_MOST_PATHS, _MOST_ROWS = 60, 12
 # Ratio of peak tip displacements above which bodies count as twins of a symmetric mechanism and are shown once.
 _ALIKE = 0.9
 # Bound of rounding errors, as a share of the largest energy.
 _ROUNDING = 1e-12
 # Displacements of ends differ from deflections, which are measured from a link's chord.
 _TIPS = "Distance of a link's last end from the tangent at its first end."
-_LINKS = "Links"
+_LINKS, _POINTS = "Links", "Points"
 
 
 @figure(
@@ -240,9 +242,72 @@ def point_motions(data: xr.Dataset, points: Sequence[str] = ()) -> Iterator[Char
         yield of_names(chart, data, [(names[k], sizes[:, :, j]) for j, k in enumerate(shown)])
 
 
-def points_of(data: xr.Dataset, points: Sequence[str]) -> list[int]:
-    """Return the indices of named points, by default of those that move."""
-    return [point_number(data, point, "points") for point in points] or moving_points(data)
+@figure(
+    "x and y of position, velocity and acceleration of named points", heading=_POINTS, takes="mode", points="points",
+    panels="choices", members=4, height=33.0, variables=("point_velocity", "point_acceleration"),
+)  # fmt: skip
+def point_components(data: xr.Dataset, points: Sequence[str] = ()) -> Iterator[Chart]:
+    """Yield charts of x and y of position, velocity and acceleration of points, one at a time; see `point_motions`."""
+    most, names, axes = _MOST_ROWS // data.sizes["mode"], names_of(data, "point"), names_of(data, "axis")
+    shown = points_of(data, points, max(1, min(most, _MOST_POINTS)))
+    for quantity, unit, symbol in (("position", "m", "r"), ("velocity", "m/s", "v"), ("acceleration", "m/s²", "a")):
+        values = data[f"point_{quantity}"].transpose("mode", "point", "axis", "time").values[:, shown]
+        axis = Axis(quantity, unit, symbol, extent=peak(ranges(values, axis=-1)))
+        curves = [
+            Curve(name, values[r, k, a], look=look(a), run=r, shown=(r,), choice=k, stopped=stopped)
+            for r, stopped in enumerate(stopped_runs(data)) for k in range(len(shown)) for a, name in enumerate(axes)
+        ]  # fmt: skip
+        yield Chart(f"point-{quantity}", f"{quantity.capitalize()} of points", axis, curves,
+                    choices=[names[k] for k in shown], choosing="point")  # fmt: skip
+
+
+@figure("paths of named points in the plane", heading=_POINTS, takes="mode", points="points",
+        variables=("point_position",), defaults=lambda data: {"points": _few_points(data)})  # fmt: skip
+def point_paths(data: xr.Dataset, points: Sequence[str] = ()) -> Iterator[Chart]:
+    """Yield the chart of the paths of named points in the plane, their trails.
+
+    Parameters
+    ----------
+    points : sequence of str
+        Points "body.point" to plot; by default all that move. The printed figure by default shows the end-effector and
+        the points that travel most, up to seven.
+    """
+    chart = Chart("points", "Paths of points", Axis("", "m", "y"), x=Axis("", "m", "x"), equal=True)
+    yield _in_the_plane(chart, data, "point_position", points)
+
+
+@figure("hodographs: velocity of named points in y over that in x", heading=_POINTS, takes="mode", points="points",
+        variables=("point_velocity",), defaults=lambda data: {"points": _few_points(data)})  # fmt: skip
+def hodographs(data: xr.Dataset, points: Sequence[str] = ()) -> Iterator[Chart]:
+    """Yield the chart of the hodographs of points, which the tips of their velocity vectors draw; see `point_paths`."""
+    chart = Chart("hodographs", "Hodographs of points", Axis("velocity", "m/s", "y\u0307"),
+                  x=Axis("velocity", "m/s", "x\u0307"), equal=True)  # fmt: skip
+    yield _in_the_plane(chart, data, "point_velocity", points)
+
+
+def _few_points(data: xr.Dataset) -> list[str]:
+    return [names_of(data, "point")[k] for k in moving_points(data)]
+
+
+def _in_the_plane(chart: Chart, data: xr.Dataset, variable: str, points: Sequence[str]) -> Chart:
+    """Return a chart, without curves, of the second component of a vector of points over the first."""
+    values, names = data[variable].transpose("mode", "point", "axis", "time").values, names_of(data, "point")
+    shown = points_of(data, points, _MOST_PATHS)
+    curves = []
+    for r, stopped in enumerate(stopped_runs(data)):
+        for k, one in enumerate(shown):
+            x, y = values[r, one]
+            curves += [Curve(names[one], y, x, look(k), run=r, shown=(r,), stopped=stopped),
+                       Curve("", y[:1], x[:1], look(k), shown=(r,), mark="square")]  # fmt: skip
+    if not shown:
+        x, y = np.moveaxis(values[0, ..., 0], 1, 0)
+        curves = [Curve("points, which do not move", y, x, look(0), mark="dot")]
+    return replace(chart, curves=curves, on_page=bool(shown))
+
+
+def points_of(data: xr.Dataset, points: Sequence[str], most: int = _MOST_POINTS) -> list[int]:
+    """Return the indices of named points, by default of those that move, at most `most`."""
+    return [point_number(data, point, "points") for point in points] or moving_points(data, most)
 
 
 def moving_points(data: xr.Dataset, most: int = _MOST_POINTS) -> list[int]:
@@ -250,8 +315,8 @@ def moving_points(data: xr.Dataset, most: int = _MOST_POINTS) -> list[int]:
 
     They are at most `most`, those that travel most. Only one of coincident points is returned.
     """
-    places = data["point_position"].isel(mode=0).transpose("time", "point", "axis").values
-    names = names_of(data, "point")
+    first = data["point_position"].isel(mode=0, model=0, missing_dims="ignore")
+    places, names = first.transpose("time", "point", "axis").values, names_of(data, "point")
     travel = ranges(places).max(axis=1)
     # Coincident points share a line, named after the end-effector if it is one of them. Names of generated points
     # contain "._".

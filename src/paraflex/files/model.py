@@ -11,6 +11,7 @@ from paraflex.control.shaping.shaped import shape_torques
 from paraflex.equilibria.conditions import StaticsDefaults, conditions
 from paraflex.errors import InputError, renamed, suggestion, within
 from paraflex.findings import warn_of
+from paraflex.formatting import checked_units
 from paraflex.late import save_file
 from paraflex.mechanism import ActuationMode, Mechanism, Start, parse_mode, standing
 from paraflex.mechanism.quantities import known
@@ -417,6 +418,7 @@ def load_path(file: str | FilePath) -> Path:
 
 
 def _model(table: ModelTable, data: dict[str, Any], source: str, text: str) -> Model:
+    checked_units(table.units.items())
     mechanism = read_mechanism(table)
     paths = read_paths(table.path)
     torques = read_torques(table)

@@ -56,6 +56,7 @@ from paraflex.mechanism.loads import InTime
 from paraflex.mechanism.quantities import joint_pair
 from paraflex.mechanism.sections import SHAPES
 from paraflex.paths import Circle, Line, Path, PointPath, Polygon, SequencePath, TabulatedPath
+from paraflex.units import QuantityName
 from .expressions import CONSTANTS, ExpressionError, check_in_time, evaluate
 from .study import StudyDefaults
 
@@ -610,6 +611,7 @@ class _Parts(_Table):
         'curvature of beams at lumped moments of inertia: "separate", or "shared" as in the paper', "separate"
     )
     parameters: dict[str, Any] = _optional("numbers by name, for expressions of them in quotes", {})
+    units: dict[QuantityName, Text] = _optional("the unit in which each quantity is shown", {})
     section: dict[str, SectionTable] = {}
     material: dict[str, MaterialTable] = {}
     lump: dict[str, LumpTable] = {}

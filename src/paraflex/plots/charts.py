@@ -19,8 +19,9 @@ from matplotlib.ticker import FixedLocator, LogLocator, NullFormatter, NullLocat
 from paraflex.arguments import checked_arguments
 from paraflex.arrays import Array
 from paraflex.errors import InputError
+from paraflex.figures.abscissae import drawn_over
 from paraflex.figures.catalogue import all_figures
-from paraflex.figures.charts import Axis, Chart, Curve, is_logarithmic, joined, symmetrical_numbers
+from paraflex.figures.charts import TIME, Axis, Chart, Curve, is_logarithmic, joined, symmetrical_numbers
 from paraflex.figures.entry import Figure as CatalogueFigure, prepared
 from paraflex.figures.selection import default_mode, names_of, prototype_pair
 from paraflex.formatting import ROUNDING, logarithmic_number, peak, shortened
@@ -135,10 +136,13 @@ def plotting_function(name: str) -> Callable[..., Figure]:
     chosen = {"mode": ["mode"], "models": ["mode", "models"]}.get(entry.takes, [])
     more = [inspect.Parameter(one, inspect.Parameter.POSITIONAL_OR_KEYWORD, default=None, annotation=kinds[one])
             for one in chosen]  # fmt: skip
-    shown = inspect.Signature([own[0], *more, *own[1:]])
+    abscissa = inspect.Parameter("over", inspect.Parameter.KEYWORD_ONLY, default=TIME.name, annotation=str)
+    last = [abscissa] if entry.takes in ("results", "mode", "models") else []
+    shown = inspect.Signature([own[0], *more, *own[1:], *last])
 
     def plot(*args: Any, **given: Any) -> Figure:
         options = shown.bind(*args, **given).arguments
+        over = options.pop(abscissa.name, TIME.name)
         data = options.pop(own[0].name, None)
         mode, models = (options.pop(one, None) if one in chosen else None for one in ("mode", "models"))
         if chosen and mode is None and "mode" in getattr(data, "dims", ()):
@@ -152,6 +156,8 @@ def plotting_function(name: str) -> Callable[..., Figure]:
         charts = entry.describe(found, **{**entry.defaults(found), **options}) if entry.has_variables(found) else []
         if not charts:
             raise InputError(entry.missing[0], field="figure", value=name, remedy=entry.missing[1])
+        if over != TIME.name:
+            charts = drawn_over(charts, found, over)
         if not isinstance(found, xr.Dataset) or "time" not in found.dims:
             return print_figure(entry, charts)
         # Runs of a verification are those of all models in the first mode, then in the next one.

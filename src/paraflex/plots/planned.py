@@ -9,7 +9,9 @@ from typing import TYPE_CHECKING, Any
 
 from paraflex import plots
 from paraflex.errors import InputError, suggestion
-from paraflex.figures.entry import Figure as CatalogueFigure
+from paraflex.figures.abscissae import find_abscissa
+from paraflex.figures.charts import TIME
+from paraflex.figures.entry import Figure as CatalogueFigure, prepared
 from paraflex.figures.selection import default_mode, names_of, place_of, point_number, prototype_pair
 from .catalogue import CATALOGUE, figure_names
 
@@ -76,6 +78,7 @@ def drawings(
     modes: Sequence[str] = (),
     metrics: Sequence[str] = (),
     points: Sequence[str] = (),
+    over: str = TIME.name,
 ) -> list[PlannedFigure]:
     """Plan a figure of some results: one drawing, or one for each mode, run or point.
 
@@ -91,6 +94,8 @@ def drawings(
         Metrics, for figures of many designs; by default the first that vary.
     points : sequence of str
         Named points to show; by default the end-effector, or those that travel most.
+    over : str
+        Abscissa of curves over time, see `figures.abscissae`.
 
     Returns
     -------
@@ -99,9 +104,17 @@ def drawings(
     Raises
     ------
     InputError
-        There is no such mode or point, or the figure does not show points.
+        There is no such mode, point or abscissa, or the figure does not show points or has no curves over time.
     """
     figures = _of_modes(source, figure, modes, metrics)
+    if over != TIME.name:
+        if not figure.is_over_time(source.data):
+            problem = f"{figure.name} has no curves over time"
+            raise InputError(problem, field="--over", value=over, remedy="leave it out")
+        find_abscissa(prepared(source.data), over, "--over")
+        chosen: dict[str, Any] = {"over": over}
+        figures = [PlannedFigure(figure, f"{one.of}_over_{over}".lstrip("_"), partial(one.draw, **chosen))
+                   for one in figures]  # fmt: skip
     if not points:
         return figures
     if not figure.points:

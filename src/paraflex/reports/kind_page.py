@@ -9,7 +9,9 @@ from pathlib import Path
 import xarray as xr
 
 from paraflex.arguments import checked_arguments
+from paraflex.figures.abscissae import offered
 from paraflex.figures.catalogue import page_panels
+from paraflex.figures.entry import prepared
 from paraflex.figures.runs import thinned
 from paraflex.folders.kinds import RESULT_KINDS
 from paraflex.results.findings import finding_lines, verdict_of
@@ -47,6 +49,7 @@ def kind_page(data: xr.Dataset) -> Page:
         figures=[tile for module in modules if hasattr(module, "tiles") for tile in module.tiles(data)],
         more=sections(tables),
         panels=page_panels(kind, few),
+        abscissae=offered(prepared(few)) if "time" in few.dims else (),
         time=few["time"].values if "time" in few.dims else (),
         notes=finding_lines(verdict_of(data)),
     )

@@ -19,6 +19,7 @@ from paraflex.arguments import checked_arguments, named_in_errors
 from paraflex.arrays import ArrayLike
 from paraflex.display import Shown
 from paraflex.errors import InputError
+from paraflex.figures.abscissae import Abscissa
 from paraflex.figures.charts import (
     Array,
     Axis,
@@ -78,6 +79,8 @@ class Page(Shown):
         Charts over time or of single runs.
     time : (k,) array
         Abscissae of curves without x; empty if nothing moves.
+    abscissae : sequence of Abscissa
+        Quantities over which the reader may see the charts over time.
     runs : sequence of str
         Names of the runs that can be selected.
     groups : sequence of (str, int)
@@ -110,6 +113,7 @@ class Page(Shown):
     designs: Designs | None = None
     panels: Sequence[Panel] = ()
     time: ArrayLike = ()
+    abscissae: Sequence[Abscissa] = ()
     runs: Sequence[str] = ()
     groups: Sequence[tuple[str, int]] = ()
     selecting: str = "mode"
@@ -205,6 +209,8 @@ def _data(page: Page) -> dict[str, Any]:
 
     return {
         "time": time,
+        "abscissae": [{"name": axis.name, "label": axis.label(unit), "rows": [series.add(unit.factor * x) for x in row]}
+                      for _, axis, row, _ in page.abscissae for unit in [axis.unit_for(row)]],
         "runs": list(page.runs),
         "groups": [list(group) for group in page.groups],
         "selecting": page.selecting,
@@ -215,7 +221,7 @@ def _data(page: Page) -> dict[str, Any]:
         "film": None if page.film is None else page.film.to_dict(),
         "palettes": {name: look.links for name, look in THEMES.items()},
         "series": series.to_dict(),
-    }
+    }  # fmt: skip
 
 
 def _fields(thing: Any, *left_out: str) -> dict[str, Any]:

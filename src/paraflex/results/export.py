@@ -17,6 +17,7 @@ from paraflex.arguments import checked_arguments
 from paraflex.arrays import NDArray
 from paraflex.errors import InputError, suggestion
 from paraflex.folders import RESULT_KINDS, added_to
+from paraflex.formatting import output_unit
 from paraflex.writing import whole_file
 from .beam_stresses import SECTION
 from .controllers import SAMPLE, controller_names, controller_variables, dimension
@@ -201,8 +202,15 @@ def _write_table(table: pd.DataFrame, file: Path, to: str, about: Mapping[str, s
 
 
 def _write_csv(table: pa.Table, units: Mapping[str, str], file: Path) -> None:
-    from pyarrow import csv
+    """Write a table as CSV, in output units where there are any."""
+    import pyarrow as pa
+    from pyarrow import compute, csv
 
+    units = dict(units)
+    for k, name in enumerate(table.column_names):
+        if (shown := output_unit(units[name])).factor != 1.0:
+            values = compute.call_function("multiply", [table[name], pa.scalar(shown.factor)])
+            table, units[name] = table.set_column(k, name, values), shown.name
     names = [f"{name} [{units[name]}]" if units[name] else name for name in table.column_names]
     try:
         csv.write_csv(spreadsheet_table(table.rename_columns(names)), file)

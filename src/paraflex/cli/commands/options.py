@@ -27,6 +27,7 @@ method_option: FieldMaker = partial(option, "--method NAME", "Method of integrat
 assembly_option: FieldMaker = partial(option, "--assembly NAME", "Assembly (configuration) of the mechanism.")
 replace_switch: FieldMaker = partial(switch, "--force", "Replace results of another kind that the folder holds.")
 report_switch: FieldMaker = partial(switch, "--report/--no-report", "Write report.html, or leave it out.", default=True)
+units_option: FieldMaker = partial(option, "--units UNIT,...", 'Units of tables, figures and CSV files, "deg,mm,kN".')
 outside_switch: FieldMaker = partial(switch, "--allow-outside", "Read tables outside the model's folder that it names.")
 
 
@@ -56,6 +57,7 @@ class ModelChoice:
         "--set FIELD=VALUE", 'Value in place of the file\'s, "link1.length=80 mm"; repeatable.'
     )
     allow_outside: bool = outside_switch()
+    units: str | None = units_option()
 
     def __post_init__(self) -> None:
         if self.source is not None and self.mechanism is not None and self.source != self.mechanism:

@@ -80,7 +80,11 @@ def with_options(request: type, answer: Callable[[Any], int | None]) -> Callable
     """Return a Typer command with a parameter for each option of its request; `answer` returns the exit code."""
 
     def called(**given: Any) -> None:
-        raise typer.Exit(answer(filled(request, given)) or 0)
+        from paraflex.formatting import output_units  # needed when a command is run, not for the help
+
+        chosen = given.get("units")
+        with output_units(() if chosen is None else chosen.split(","), "--units"):
+            raise typer.Exit(answer(filled(request, given)) or 0)
 
     parameters = []
     for one, kind in _options(request):

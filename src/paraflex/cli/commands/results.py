@@ -3,6 +3,7 @@
 from dataclasses import MISSING, dataclass
 from functools import partial
 
+from .options import units_option
 from .requests import argument, option, repeatable, switch
 
 _results = partial(argument, "RESULTS", "A folder or file that paraflex wrote.")
@@ -15,6 +16,7 @@ class ReportRequest:
 
     results: str = argument("RESULTS", "A folder of run, verify, sweep, optimise or identify, or a file of it.")
     output: str | None = option("--output FILE", "Output. Default: report.html beside the results.")
+    units: str | None = units_option()
     force: bool = switch("--force", "Overwrite an existing file.")
 
 
@@ -48,6 +50,7 @@ class CompareRequest:
     second: str = argument("RESULTS", "The results compared with it.")
     modes: list[str] = repeatable("--mode MODE", "Actuation mode; repeatable. Default: all that both have.")
     out: str | None = option("--out DIR", "Folder for compare.json and figures.")
+    units: str | None = units_option()
     force: bool = _overwrite()
     json: bool = switch("--json", "Print the numbers as JSON.")
 
@@ -60,6 +63,7 @@ class ExportRequest:
     to: str = option("--to csv|parquet|mat|netcdf", "Format of the files.", default=MISSING)
     output: str | None = option("--output --out FILE|DIR", "Output. Default: export/ beside the results.")
     shapes: bool = switch("--shapes", "Also a table of deformed shapes; mat and netcdf always have them.")
+    units: str | None = units_option()
     force: bool = _overwrite()
 
 
@@ -77,6 +81,10 @@ class PlotRequest:
         "--point BODY.POINT",
         "Named point in place of the end-effector; repeatable. With all: in figures that show points.",
     )
+    over: str = option(
+        "--over NAME", 'Abscissa of curves over time: a joint, or "BODY.POINT.x". With all: of figures that have any.',
+        default="time",
+    )  # fmt: skip
     styles: list[str] = repeatable(
         "--style STYLE",
         "single or double: width of one or two columns, by default what suits each figure; or a style of Matplotlib, "
@@ -87,5 +95,6 @@ class PlotRequest:
     format: str = option("--format pdf,svg,png,pgf", "One or several formats; pgf needs LaTeX.", default="pdf")
     output: str | None = option("--output --out DIR", "Folder. Default: figures/ in RESULTS.")
     dpi: float = option("--dpi N", "Dots per inch of PNG.", default=300.0)
+    units: str | None = units_option()
     force: bool = _overwrite()
     only_list: bool = switch("--list", "List the figures of these results.")

@@ -3,7 +3,7 @@
 from dataclasses import dataclass, field
 from pathlib import Path
 
-from .options import WorkersChoice, json_switch, outside_switch, replace_switch, report_switch
+from .options import WorkersChoice, json_switch, outside_switch, replace_switch, report_switch, units_option
 from .requests import argument, option, repeatable
 
 
@@ -14,6 +14,7 @@ class StudyRequest:
     study: str = argument("STUDY.toml", "Study file: free parameters, their bounds, runs.")
     output: str | None = option("--output --out DIR", "Folder for results. Default: results/STUDY.")
     allow_outside: bool = outside_switch()
+    units: str | None = units_option()
 
     @property
     def folder(self) -> Path:

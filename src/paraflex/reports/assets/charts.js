@@ -24,6 +24,18 @@ const charts = (() => {
     return Array.isArray(label) ? label[label.length > 1 ? chart.choice : 0] : label;
   };
 
+  // Charts over time may be over another quantity; curves may have sample times of their own.
+  const isOverTime = (chart) => chart.description.over_time && !state.over;
+  const abscissa = (chart) => (chart.description.over_time && state.over ? page.abscissae[state.over - 1] : null);
+  const at = (row, [before, share]) => row[before] + (share ? share * (row[before + 1] - row[before]) : 0);
+
+  function xRow(chart, curve) {
+    const own = report.row(curve.x), over = abscissa(chart), times = report.row(page.time);
+    if (!over) return own;
+    const values = report.row(over.rows[curve.run ?? state.run]);
+    return own === times ? values : own.map((time) => at(values, report.between(times, time)));
+  }
+
   const isOwn = (chart) => Boolean(chart.description.drawer);
   const ownFigure = (chart) => (isOwn(chart) ? designs.figure(chart) : null);
 
@@ -39,21 +51,21 @@ const charts = (() => {
         marker: { color: lineColour(curve) }, hovertemplate: "%{x:.4~g}<extra>%{fullData.name}</extra>", visible: chart.hidden.has(curve.name) ? "legendonly" : true,
       };
       if (curve.mark) return {
-        type: "scatter", mode: curve.line ? "lines+markers" : "markers", line: { color: lineColour(curve), dash: DASHES[curve.dash], width: 1.4 }, name: plain(curve.name), x: report.row(curve.x), y: report.row(curve.y),
+        type: "scatter", mode: curve.line ? "lines+markers" : "markers", line: { color: lineColour(curve), dash: DASHES[curve.dash], width: 1.4 }, name: plain(curve.name), x: xRow(chart, curve), y: report.row(curve.y),
         opacity: curve.faint ? 0.5 : 1,
         marker: { symbol: MARKS[curve.mark], color: lineColour(curve), size: curve.faint ? 6 : (curve.size ?? 1) * (curve.mark === "ring" ? 9 : 8), line: { width: 1.6, color: lineColour(curve) } },
         text: curve.texts.map(plain), hovertemplate: `${curve.texts.length ? "%{text}" : "%{x:.4~g}, %{y:.4~g}"}<extra>%{fullData.name}</extra>`, visible: chart.hidden.has(curve.name) ? "legendonly" : true,
       };
       return {
         type: "scatter", mode: "lines", name: plain(curve.name),
-        x: report.row(curve.x), y: report.row(curve.y),
+        x: xRow(chart, curve), y: report.row(curve.y),
         line: {
           color: lineColour(curve), dash: DASHES[curve.dash], width: chosen ? 2.8 : beside ? 1.4 : 1.7,
           simplify: false,
         },
         opacity: beside && !chosen ? 0.8 : 1,
         visible: chart.hidden.has(curve.name) ? "legendonly" : true,
-        ...(curve.quiet ? { hoverinfo: "skip" } : { hovertemplate: "%{y:.4~g}<extra>%{fullData.name}</extra>" }),
+        ...(curve.quiet ? { hoverinfo: "skip" } : { hovertemplate: `${abscissa(chart) ? "%{x:.4~g}, " : ""}%{y:.4~g}<extra>%{fullData.name}</extra>` }),
       };
     });
   }
@@ -90,7 +102,8 @@ const charts = (() => {
   }
 
   function layout(chart) {
-    const { log, log_x: logX, equal, over_time: overTime, layout: added } = chart.description;
+    const { log, log_x: logX, equal, layout: added } = chart.description;
+    const over = abscissa(chart), overTime = isOverTime(chart);
     const figure = ownFigure(chart);
     const common = {
       paper_bgcolor: "rgba(0,0,0,0)", plot_bgcolor: "rgba(0,0,0,0)", showlegend: false,
@@ -99,7 +112,7 @@ const charts = (() => {
       hoverlabel: { bgcolor: report.colour("card"), bordercolor: report.colour("line"), font: { color: report.colour("text") } },
       modebar: { color: report.colour("soft"), activecolor: report.colour("accent"), bgcolor: "rgba(0,0,0,0)" },
       // What the reader zoomed to stays while other runs are looked at.
-      uirevision: `${chart.choice} ${chart.picked}`,
+      uirevision: `${chart.choice} ${chart.picked} ${over ? state.over : 0}`,
     };
     if (figure) {
       const { xaxis, yaxis, noAxes, ...own } = figure.layout || {};
@@ -108,9 +121,9 @@ const charts = (() => {
     return {
       ...common,
       hovermode: overTime ? "x unified" : "closest", barmode: "overlay",
-      xaxis: axis(chart.description.x, overTime ? { range: report.timeRange, hoverformat: ".4~g" } : logX ? { type: "log", dtick: 1, tickformat: "~g", hoverformat: ".4~g" } : added.xaxis || {}),
+      xaxis: axis(over ? over.label : chart.description.x, overTime ? { range: report.timeRange, hoverformat: ".4~g" } : logX ? { type: "log", dtick: 1, tickformat: "~g", hoverformat: ".4~g" } : added.xaxis || {}),
       yaxis: axis(yLabel(chart), { automargin: true, ...(log ? { type: "log", range: decades(chart), tickformat: "~g", ...steps(decades(chart)) } : {}), ...(equal && !added.xaxis ? { scaleanchor: "x" } : {}), hoverformat: ".4~g", ...added.yaxis }),
-      shapes: added.shapes || [],
+      shapes: (added.shapes || []).filter((shape) => !over || shape.type === "line"),
     };
   }
 
@@ -128,7 +141,7 @@ const charts = (() => {
     if (first) {
       chart.plot.on("plotly_afterplot", () => moveCursor(chart));
       if (chart.description.drawer) chart.plot.on("plotly_click", (event) => designs.choose(event.points[0]));
-      else if (chart.description.over_time) chart.plot.on("plotly_click", (event) => player.seek(event.points[0].x));
+      else if (chart.description.over_time) chart.plot.on("plotly_click", (event) => isOverTime(chart) && player.seek(event.points[0].x));
     }
     drawLegend(chart);
     moveCursor(chart);
@@ -180,23 +193,24 @@ const charts = (() => {
       mark.style.visibility = shows ? "visible" : "hidden";
       if (shows) mark.style.transform = `translate(${xaxis._offset + x}px, ${yaxis._offset + y}px)`;
     };
-    if (chart.description.over_time) {
+    if (isOverTime(chart)) {
+      for (const dot of chart.dots) dot.style.visibility = "hidden";
       chart.cursor.style.height = `${yaxis._length}px`;
       put(chart.cursor, xaxis.d2p(state.time), 0);
       return;
     }
+    chart.cursor.style.visibility = "hidden";
     const curves = chart.description.curves.filter(
       (curve) => curve.run === state.run && isShown(chart, curve) && !chart.hidden.has(curve.name));
     while (chart.dots.length < curves.length) {
       chart.dots.push(element("div", { class: "dot" }));
       chart.plot.parentElement.append(chart.dots.at(-1));
     }
-    const [before, share] = report.between(report.row(page.time), state.time);
     chart.dots.forEach((dot, k) => {
       if (k >= curves.length) { dot.style.visibility = "hidden"; return; }
-      const at = (row) => row[before] + (share ? share * (row[before + 1] - row[before]) : 0);
+      const place = report.between(report.row(abscissa(chart) ? curves[k].x : page.time), state.time);
       dot.style.background = lineColour(curves[k]);
-      put(dot, xaxis.d2p(at(report.row(curves[k].x))), yaxis.d2p(at(report.row(curves[k].y))));
+      put(dot, xaxis.d2p(at(xRow(chart, curves[k]), place)), yaxis.d2p(at(report.row(curves[k].y), place)));
     });
   }
 
@@ -272,6 +286,7 @@ const charts = (() => {
     for (const chart of all) watch.observe(chart.figure);
     report.on("run", refresh);
     report.on("theme", refresh);
+    report.on("over", refresh);
     report.on("time", () => { for (const chart of all) if (chart.inView) moveCursor(chart); });
     addEventListener("beforeprint", () => {
       if (!window.Plotly) return;

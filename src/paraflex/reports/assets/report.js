@@ -4,8 +4,8 @@ const report = (() => {
   const page = JSON.parse(document.getElementById("report-data").textContent);
   const root = document.documentElement;
   const dark = matchMedia("(prefers-color-scheme: dark)");
-  const listeners = { run: [], time: [], theme: [], magnify: [], playing: [] };
-  const state = { run: page.selected, time: 0, magnify: page.film ? page.film.magnify : 1, playing: false };
+  const listeners = { run: [], time: [], over: [], theme: [], magnify: [], playing: [] };
+  const state = { run: page.selected, time: 0, over: 0, magnify: page.film ? page.film.magnify : 1, playing: false };
   let rows = [];
 
   async function inflated(text) {

@@ -69,6 +69,13 @@ const begin = (() => {
     });
   }
 
+  function makeOver() {
+    const select = byId("over");
+    byId("has-over").hidden = !page.abscissae.length;
+    ["time", ...page.abscissae.map((one) => one.name)].forEach((name, k) => select.append(new Option(name, k)));
+    select.addEventListener("change", () => report.set("over", Number(select.value)));
+  }
+
   function makeTheme() {
     const button = byId("theme"), names = ["auto", "light", "dark"];
     const show = () => {
@@ -137,6 +144,7 @@ const begin = (() => {
 
   async function open() {
     makeSelector();
+    makeOver();
     makeTheme();
     showScrolling();
     byId("keyed").textContent = page.selecting;
