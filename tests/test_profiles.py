@@ -1,5 +1,7 @@
 """Prescribed profiles of model files: exact derivatives, pieces that meet, tables; and what is refused."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import scipy.interpolate
@@ -10,7 +12,8 @@ from paraflex.files import load
 from paraflex.files.expressions import ExpressionError, evaluate_in_time
 from paraflex.integrators import IntegrationOptions
 from paraflex.kernel.signals import evaluate_signal
-from paraflex.mechanism import ConstantSpeed, PiecewiseProfile, TabulatedProfile
+from paraflex.mechanism import ConstantSpeed, PiecewiseProfile, SpeedProfile, TabulatedProfile
+from paraflex.mechanism.profiles import Interpolation
 from paraflex.motion import simulate_motion
 from test_spin_up import acceleration, angle, rate
 
@@ -313,3 +316,60 @@ def test_a_parameter_called_t_is_no_time(tmp_path):
     file.write_text(DISC.replace("w = 5.0", "t = 5.0") + 'angle = "t"')
     with pytest.raises(InputError, match=r'prescribed\.drive\.angle: "t" is the time in this expression'):
         load(file)
+
+
+# --- Speeds -------------------------------------------------------------------------------------------------------
+
+
+def test_a_speed_by_an_expression_is_integrated_to_rounding(tmp_path):
+    profile = profile_of(tmp_path, 'angle = 1.0\nspeed = "20 * (1 - exp(-t / 0.01))"')
+    t = np.linspace(0.0, 3.0, 301)
+    angle, rate, acceleration = profile.evaluate(t)
+    assert angle == pytest.approx(1.0 + 20.0 * t - 0.2 * (1.0 - np.exp(-t / 0.01)), abs=1e-12)
+    assert rate == pytest.approx(20.0 * (1.0 - np.exp(-t / 0.01)), abs=1e-12)
+    assert acceleration == pytest.approx(2000.0 * np.exp(-t / 0.01), abs=1e-9)
+
+
+def test_ramps_are_parabolas_that_meet_in_value_and_rate(tmp_path):
+    profile = profile_of(tmp_path, 'ramps = [[0, 0], ["0.2 s", "60 rpm"], [0.5, "60 rpm"], [1, 0]]')
+    speed = 2.0 * np.pi
+    t = np.array([0.0, 0.1, 0.2, 0.35, 0.5, 0.75, 1.0])
+    angle, rate, _ = profile.evaluate(t)
+    falling = speed * ((t - 0.5) - (t - 0.5) ** 2)
+    right = np.where(t < 0.2, speed * t**2 / 0.4, np.where(t < 0.5, speed * (t - 0.1), 0.4 * speed + falling))
+    assert angle == pytest.approx(right, abs=1e-13)
+    assert rate == pytest.approx(np.interp(t, [0.0, 0.2, 0.5, 1.0], [0.0, speed, speed, 0.0]), abs=1e-13)
+    assert profile.knots == (0.2, 0.5)
+
+
+def test_a_run_follows_ramps_from_its_assembly_and_files_keep_them(tmp_path):
+    model = load(write(tmp_path, "ramps = [[0, 0], [0.5, 4], [1, 4]]"))
+    run = simulate_motion(model, 1.0, samples=3, warning=False)
+    turned = run.solution.q[:, -1] - run.solution.q[0, -1]
+    assert turned == pytest.approx([0.0, 1.0, 3.0], abs=1e-7)
+    model.save(tmp_path / "again.toml")
+    assert load(tmp_path / "again.toml").mechanism.prescribed == model.mechanism.prescribed
+    swept = SpeedProfile(0.5, TabulatedProfile((0.0, 1.0), (0.0, 2.0), Interpolation.LINEAR))
+    assert swept.begun(9.0, 0.0) is swept
+    assert replace(swept, from_assembly=True).begun(9.0, 1.0).angle == pytest.approx(8.0, abs=1e-14)
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ('speed = "20"\nramps = [[0, 0], [1, 1]]', "ramps: a speed is given in two ways"),
+        ('angle = "t"\nspeed = "t"', "speed: a speed can only be added to an angle or displacement that is a number"),
+        ('speed = "t"\npieces = [{ angle = 1 }]', "pieces: speeds and values are given"),
+        ("ramps = [[0, 0]]", "ramps: a table needs two rows"),
+        ("ramps = [[0, 0], [0, 1]]", "ramps: its times must ascend"),
+        ('ramps = [[0, 0], [1, "60 mm"]]', "ramps.1.1: a quantity in m where one in rad/s is asked for"),
+        ('speed = "10 mm/s"', "speed: a quantity in m/s where one in rad/s is asked for"),
+        ('speed = "1 / t"', "speed: its value is not a finite number at t = 0 s"),
+        ("speed = true", "speed: neither a number nor an expression"),
+        ("speed = nan", "speed: not a finite number"),
+    ],
+)
+def test_speeds_that_make_no_sense_are_refused_by_name(tmp_path, text, says):
+    with pytest.raises(InputError) as caught:
+        load(write(tmp_path, text))
+    assert f"prescribed.drive.{says}" in str(caught.value)

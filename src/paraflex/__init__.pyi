@@ -49,6 +49,7 @@ from .mechanism import (
     PrescribedAngle as PrescribedAngle,
     ConstantSpeed as ConstantSpeed,
     PiecewiseProfile as PiecewiseProfile,
+    SpeedProfile as SpeedProfile,
     TabulatedProfile as TabulatedProfile,
     SampledAngle as SampledAngle,
 )

@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 
 from paraflex.arrays import Array
-from paraflex.errors import InputError
-from paraflex.mechanism import ConstantSpeed, PiecewiseProfile, TabulatedProfile, TimeProfile
+from paraflex.errors import InputError, renamed
+from paraflex.mechanism import ConstantSpeed, PiecewiseProfile, SpeedProfile, TabulatedProfile, TimeProfile
 from paraflex.mechanism.loads import InTime
 from paraflex.mechanism.profiles import Interpolation, Values
 from .expressions import check_in_time, evaluate, evaluate_in_time, expressed_in, is_constant, names_in
@@ -82,6 +82,11 @@ def read_profile(entry: PrescribedTable, parameters: Mapping[str, float], durati
         Profile given in two ways, speed together with anything but a number, pieces that do not connect, expression
         without finite derivatives, or table that is invalid or does not cover the study.
     """
+    if entry.ramps is not None or isinstance(entry.speed, str):
+        profile: TimeProfile = _speed_profile(entry, parameters)
+        with renamed("ramps" if entry.ramps is not None else "speed", only="table"):
+            _try(profile, duration)
+        return profile
     given = [*_quantities(entry), *(name for name in ("pieces", "table") if getattr(entry, name) is not None)]
     if len(given) > 1:
         raise InputError(
@@ -99,6 +104,31 @@ def read_profile(entry: PrescribedTable, parameters: Mapping[str, float], durati
         profile = replace(profile, speed=entry.speed)
     _try(profile, duration)
     return profile
+
+
+def _speed_profile(entry: PrescribedTable, parameters: Mapping[str, float]) -> TimeProfile:
+    """Read the profile of a motion whose speed is an expression of the time, or has ramps between given values."""
+    given = [name for name in ("speed", "ramps", "pieces", "table") if getattr(entry, name) is not None]
+    if len(given) > 1:
+        raise InputError(
+            "a speed is given in two ways" if given[1] == "ramps" else "speeds and values are given", field=given[-1],
+            value=", ".join(given), remedy=f"drop all but {given[0]}",
+        )  # fmt: skip
+    start = _expressions(entry, parameters)[0] if _quantities(entry) else ConstantSpeed(0.0, 0.0, from_assembly=True)
+    if not isinstance(start, ConstantSpeed):
+        raise InputError(
+            "a speed can only be added to an angle or displacement that is a number", field=given[0],
+            value=entry.speed, remedy="write it into the profile",
+        )  # fmt: skip
+    if entry.ramps is not None:
+        with renamed("ramps", only="table"):
+            times, speeds = zip(*entry.ramps, strict=True) if entry.ramps else ((), ())
+            speed: TimeProfile = TabulatedProfile(times, speeds, Interpolation.LINEAR)
+    else:
+        speed = _expression(str(entry.speed), parameters, "speed")
+    if isinstance(speed, ConstantSpeed):
+        return replace(start, speed=speed.angle)
+    return SpeedProfile(start.angle, speed, start.from_assembly)
 
 
 def _try(profile: TimeProfile, duration: float | None) -> None:
@@ -127,6 +157,12 @@ def profile_table(profile: TimeProfile, quantity: str) -> dict[str, Any]:
     """
     if isinstance(profile, ConstantSpeed) and not profile.knots:
         speed = {"speed": profile.speed} if profile.speed else {}
+        return speed if profile.from_assembly else {quantity: profile.angle} | speed
+    if isinstance(profile, SpeedProfile):
+        speed = components_table((profile.speed,), "speed")
+        if speed.pop("interpolation", "linear") != "linear" or "pieces" in speed:
+            raise _inexpressible_profile(profile)
+        speed = {"ramps": speed["table"]} if "table" in speed else speed
         return speed if profile.from_assembly else {quantity: profile.angle} | speed
     if isinstance(profile, ConstantSpeed | ExpressionProfile) and profile.knots:
         raise _inexpressible_profile(profile)
@@ -273,6 +309,7 @@ def profile_parameters(profiles: Iterable[tuple[str, TimeProfile]]) -> dict[str,
     """
     found: dict[str, float] = {}
     for place, whole in profiles:
+        whole = whole.speed if isinstance(whole, SpeedProfile) else whole
         for profile in whole.pieces if isinstance(whole, PiecewiseProfile) else (whole,):
             for name, value in profile.parameters.items() if isinstance(profile, ExpressionProfile) else ():
                 if found.setdefault(name, value) != value:

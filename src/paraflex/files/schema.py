@@ -413,7 +413,12 @@ class PrescribedTable(_Table):
     displacement: FunctionOfTime | None = _optional(
         "the displacement at t = 0 in m, by default that of the assembly, or an expression of the time t"
     )
-    speed: Number | None = _optional("the speed in rad/s or m/s, from a constant start value")
+    speed: FunctionOfTime | None = _optional(
+        "the speed in rad/s, from a constant start value: a number, or an expression of the time t"
+    )
+    ramps: Rows | None = _optional(
+        "a list of [t, speed] in s and rad/s, between which the speed changes at constant rates"
+    )
     pieces: Annotated[list[PieceTable], Field(min_length=1)] | None = _optional(
         'a list of { until = s, angle = "..." }, the last without until'
     )

@@ -63,6 +63,7 @@ from .profiles import (
     ConstantSpeed as ConstantSpeed,
     PiecewiseProfile as PiecewiseProfile,
     SampledAngle as SampledAngle,
+    SpeedProfile as SpeedProfile,
     TabulatedProfile as TabulatedProfile,
     TimeProfile as TimeProfile,
 )

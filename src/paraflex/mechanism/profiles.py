@@ -1,7 +1,7 @@
 """Profiles of prescribed motions, loads and torques in time: functions, constant speed, pieces and tables."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import Enum
 from functools import cached_property
 from itertools import pairwise
@@ -23,6 +23,8 @@ _BEYOND_TABLE = 1e-9
 _DEGREE = 5
 # Largest number of kinks of a linear table at which integration steps end; error control handles the less sharp ones.
 _MOST_STOPS = 200
+# Points of Gauss' formula, halvings of an interval, and relative error of an integral.
+_GAUSS, _HALVINGS, _INTEGRATED = 10, 30, 1e-15
 
 
 @named_in_errors("a profile", "a profile in time: ConstantSpeed, PiecewiseProfile, TabulatedProfile or SampledAngle")
@@ -93,6 +95,74 @@ class ConstantSpeed(CheckedFields):
     def evaluate(self, t: Array) -> Values:
         """Return the value, its rate and its acceleration at times t [s]."""
         return self.angle + self.speed * t, np.full_like(t, self.speed), np.zeros_like(t)
+
+    def begun(self, value: float, time: float) -> "ConstantSpeed":
+        """Return the profile with a value at a time [s], if its start is not given."""
+        return replace(self, angle=value - time * self.speed) if self.from_assembly else self
+
+
+@dataclass(frozen=True)
+class SpeedProfile(CheckedFields):
+    """Profile whose speed is given over time: its integral, from a value at t = 0, `angle` [rad or m].
+
+    Between the knots of the speed it is integrated by Gauss' formula with ten points, on intervals that are halved
+    until their halves agree to rounding.
+
+    Attributes
+    ----------
+    angle : float
+        Value at t = 0 [rad or m].
+    speed : TimeProfile
+        Speed over time [rad/s or m/s], continuous for a prescribed motion.
+    from_assembly : bool
+        Whether the start value is taken from the assembly or initial state of a run: see `ConstantSpeed`.
+    """
+
+    _table = "profile"
+
+    angle: float
+    speed: TimeProfile
+    from_assembly: bool = field(default=False, compare=False)
+
+    @property
+    def knots(self) -> tuple[float, ...]:
+        """Times at which the acceleration jumps [s]."""
+        return self.speed.knots
+
+    def evaluate(self, t: Array) -> Values:
+        """Return the value, its rate and its acceleration at times t [s]."""
+        rate, acceleration, _ = self.speed.evaluate(t)
+        return self.angle + self._travel(np.asarray(t, dtype=float)), rate, acceleration
+
+    def begun(self, value: float, time: float) -> "SpeedProfile":
+        """Return the profile with a value at a time [s], if its start is not given."""
+        if not self.from_assembly:
+            return self
+        return replace(self, angle=value - float(self._travel(np.array([time]))[0]))
+
+    def _travel(self, t: Array) -> Array:
+        """Return the integral of the speed from 0 to times t [s]."""
+        end = float(np.max(t, initial=0.0))
+        if not end > 0.0:
+            return np.zeros(t.shape)
+        edges = np.array([0.0, *(knot for knot in self.knots if 0.0 < knot < end), end])
+        for _ in range(_HALVINGS):
+            middle = 0.5 * (edges[1:] + edges[:-1])
+            whole = self._integrals(edges[:-1], edges[1:])
+            halves = self._integrals(edges[:-1], middle) + self._integrals(middle, edges[1:])
+            coarse = np.abs(whole - halves) > _INTEGRATED * np.max(np.abs(np.cumsum(halves)), initial=1e-300)
+            if not np.any(coarse):
+                break
+            edges = np.sort(np.concatenate([edges, middle[coarse]]))
+        before = np.concatenate([[0.0], np.cumsum(self._integrals(edges[:-1], edges[1:]))])
+        piece = np.clip(np.searchsorted(edges, t, side="right") - 1, 0, edges.size - 2)
+        return before[piece] + self._integrals(edges[piece], t)
+
+    def _integrals(self, a: Array, b: Array) -> Array:
+        """Return the integrals of the speed between times a and b, each (k,)."""
+        places, weights = np.polynomial.legendre.leggauss(_GAUSS)
+        times = 0.5 * (a + b)[:, None] + 0.5 * (b - a)[:, None] * places
+        return 0.5 * (b - a) * (self.speed.evaluate(times.ravel())[0].reshape(times.shape) @ weights)
 
 
 @dataclass(frozen=True)

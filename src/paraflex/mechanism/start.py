@@ -10,7 +10,7 @@ from .joints import PointRef
 from .mechanism import Mechanism
 from .phases import joint_value
 from .poses import Pose, approximate_poses, placed_poses
-from .profiles import ConstantSpeed, TimeProfile
+from .profiles import ConstantSpeed, SpeedProfile, TimeProfile
 from .quantities import known, optional
 
 
@@ -112,8 +112,8 @@ def begun_at(mechanism: Mechanism, value: Callable[[str], float], time: float = 
     """Return the mechanism with prescribed motions whose start is not given set to the joint values at a time [s]."""
 
     def begun(profile: TimeProfile, joint: str) -> TimeProfile:
-        if isinstance(profile, ConstantSpeed) and profile.from_assembly:
-            return replace(profile, angle=value(joint) - time * profile.speed)
+        if isinstance(profile, ConstantSpeed | SpeedProfile) and profile.from_assembly:
+            return profile.begun(value(joint), time)
         return profile
 
     prescribed = tuple(replace(one, profile=begun(one.profile, one.joint)) for one in mechanism.prescribed)
