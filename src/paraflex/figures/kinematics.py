@@ -96,10 +96,10 @@ def _points(data: xr.Dataset) -> Table:
     columns = list(zip(*rows, strict=True)) if rows else [()] * 7
     heads = [("x from", "m"), ("x to", "m"), ("y from", "m"), ("y to", "m"), ("speed", "m/s"),
              ("acceleration", "m/s^2")]  # fmt: skip
-    return Table("Points: ranges, largest speed and acceleration at the samples", [
+    return Table("Points", [
         Column("point", columns[0]),
         *(Column(name, cells, unit) for (name, unit), cells in zip(heads, columns[1:], strict=True)),
-    ])  # fmt: skip
+    ], note="Ranges, and the largest speed and acceleration, at the samples.")  # fmt: skip
 
 
 def _special(found: Found) -> Table:
@@ -122,8 +122,8 @@ def _assemblies(found: Found) -> Table:
     """Return the table of the assemblies that were searched for: angles of all bodies at the start."""
     rows = found.get("assemblies", [])
     bodies = list(rows[0]["angles"]) if rows else []
-    return Table("Assemblies with the drive at its start, that of the motion first", [
+    return Table("Assemblies", [
         Column("assembly", list(range(1, len(rows) + 1))),
         *(Column(body, [one["angles"][body] for one in rows], "rad") for body in bodies),
         Column("found", [one["found"] for one in rows]),
-    ])  # fmt: skip
+    ], note="With the drive at its start, that of the motion first; found: random starts that led to it.")  # fmt: skip

@@ -142,6 +142,7 @@ def render(page: Page) -> str:
         title=escape(page.title),
         kind=escape(page.kind),
         subtitle=escape(page.subtitle),
+        lead=escape(_lead(page)),
         verdict=_verdict(page.verdict),
         contents=_contents(page),
         origin=_origin(page),
@@ -325,6 +326,21 @@ def _contents(page: Page) -> str:
         *([(_ORIGIN, _anchor(_ORIGIN))] if page.facts or page.command else []),
     ]
     return "".join(f'<a href="#{anchor}">{escape(heading)}</a>' for heading, anchor in parts) if len(parts) > 1 else ""
+
+
+def _lead(page: Page) -> str:
+    """Return what came out and whether to trust it: the first number, and the verdict in words."""
+    first = next((each for each in page.figures if each[0] != "status"), None)
+    words = []
+    if first is not None:
+        label, value, where = first[0], first[1], first[2].partition(";")[0]
+        words.append(f"{label[:1].upper()}{label[1:]}: {value}{f', {where}' if where else ''}.")
+    if page.verdict == "sound":
+        words.append("No check gives reason for doubt.")
+    elif page.verdict:
+        below = f": see the notice{'s' * (len(page.notes) > 1)} below" if page.notes else ""
+        words.append(f"These results are {page.verdict}{below}.")
+    return " ".join(words)
 
 
 def _notes(notes: Sequence[str]) -> str:
