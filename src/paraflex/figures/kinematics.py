@@ -94,8 +94,8 @@ def _points(data: xr.Dataset) -> Table:
             rows.append((point, *ends.ravel().tolist(), *most))
             seen.append(places)
     columns = list(zip(*rows, strict=True)) if rows else [()] * 7
-    heads = [("x from", "m"), ("x to", "m"), ("y from", "m"), ("y to", "m"), ("speed", "m/s"),
-             ("acceleration", "m/s^2")]  # fmt: skip
+    heads = [("x from", "m"), ("x to", "m"), ("y from", "m"), ("y to", "m"), ("top speed", "m/s"),
+             ("top acceleration", "m/s^2")]  # fmt: skip
     return Table("Points", [
         Column("point", columns[0]),
         *(Column(name, cells, unit) for (name, unit), cells in zip(heads, columns[1:], strict=True)),
