@@ -304,8 +304,8 @@ def test_a_flywheel_absorbs_the_fluctuation_of_a_slider_crank():
     assert found.inertia == pytest.approx(found.energy / (0.05 * 20.0**2), rel=1e-12)
     assert found.mean_torque == pytest.approx(0.0, abs=1e-9 * float(abs(data["drive_torque"]).max()))
     assert found.error < 1e-6 * found.inertia
-    for wrong in (0.0, -1.0, math.nan):
-        with pytest.raises(InputError, match="fluctuation: not positive"):
+    for wrong in (0.0, -1.0, 1.0, math.nan):
+        with pytest.raises(InputError, match="fluctuation: not between 0 and 1"):
             pf.flywheel(motion, wrong)
     with pytest.raises(InputError, match="the motion has no loads"):
         pf.flywheel(pf.kinematics(pf.load("four_bar")), 0.05)
@@ -319,7 +319,10 @@ def test_a_flywheel_absorbs_the_fluctuation_of_a_slider_crank():
         ({"drive": "X"}, "drive: unknown joint"),
         ({"start": 0.3, "end": 0.3}, "end: the drive does not move"),
         ({"speed": 0.0}, "speed: not positive"),
-        ({"speed": math.nan}, "speed: not positive"),
+        ({"speed": math.nan}, "speed: not a finite number"),
+        ({"speed": 1e-320}, "speed: of no machine"),
+        ({"start": math.inf}, "start: not a finite number"),
+        ({"end": 360.0}, "end: more than 20 turns"),
         ({"samples": 1}, "samples: too few"),
         ({"assembly": "none"}, "assembly"),
     ],
@@ -330,8 +333,10 @@ def test_wrong_arguments_are_named(given, message):
 
 
 def test_drives_that_do_not_determine_the_motion_are_named():
-    with pytest.raises(InputError, match="drive: is missing; name the joint that drives the mechanism: A1, B1"):
+    with pytest.raises(InputError, match="drive: 2 degrees of freedom need as many prescribed motions"):
         pf.kinematics(pf.load("five_bar"))
+    with pytest.raises(InputError, match="drive: no joint moves"):
+        pf.kinematics(pf.load("cross_spring_pivot"))
     with pytest.raises(InputError, match="leave 1 degree of freedom of the mechanism open"):
         pf.kinematics(pf.load("five_bar"), "A1")
     chain = pf.Mechanism(
@@ -348,6 +353,71 @@ def test_drives_that_do_not_determine_the_motion_are_named():
 def test_a_range_beyond_reach_names_the_limit():
     with pytest.raises(UnreachablePathError, match=r"Q reaches its limit of reach, 2\.49809 rad"):
         pf.kinematics(four_bar(0.4, 0.1, 0.35, 0.25), "Q", start=2.0, end=3.0)
+
+
+def test_properties_do_not_depend_on_the_samples_nor_on_the_number_of_turns():
+    mechanism = four_bar(2.0, 1.0, 2.5, 2.5, (1.25, -2.0))
+    right = pf.kinematics(mechanism, "O").features
+    for given in ({"samples": 2}, {"samples": 5000}, {"start": 0.7, "end": 0.7 + 6 * math.pi}):
+        found = pf.kinematics(mechanism, "O", **given).features
+        assert found.transmissions[0].smallest.value == pytest.approx(right.transmissions[0].smallest.value, abs=1e-12)
+        assert found.time_ratios == pytest.approx(right.time_ratios, abs=1e-10)
+        (one,), (other,) = (each.trails["coupler.P"].crunodes for each in (found, right))
+        assert one.position == pytest.approx(other.position, abs=1e-11)
+
+
+def driven_by(mechanism, **profiles):
+    """Return a mechanism with prescribed motions of joints, by functions of time and their two derivatives."""
+    laws = tuple(pf.PrescribedAngle(joint, joint, pf.SampledAngle(*three)) for joint, three in profiles.items())
+    return replace(mechanism, prescribed=laws)
+
+
+SWING = (lambda t: 1.0 + 0.5 * np.sin(t), lambda t: 0.5 * np.cos(t), lambda t: -0.5 * np.sin(t))
+
+
+def test_where_a_drive_reverses_there_is_no_cusp_and_an_end_at_the_start_is_no_crossing():
+    swung = driven_by(four_bar(0.4, 0.1, 0.35, 0.25, (0.1, 0.1)), O=SWING)
+    found = pf.kinematics(swung, duration=2.0 * math.pi).features
+    assert found.trails["coupler.P"].cusps == ()
+    assert found.trails["coupler.P"].crunodes == ()
+    # All joints reverse with the drive, and the rocker at its own dead point as well.
+    times = np.array([one.time for one in found.dead_points["Q"]])
+    assert len(times) == 4
+    assert [np.min(np.abs(times - t)) for t in (math.pi / 2, 3 * math.pi / 2)] == pytest.approx([0.0, 0.0], abs=1e-9)
+
+
+def test_links_that_only_translate_have_no_special_points():
+    rhomb = four_bar(0.2, 0.2, 0.2, 0.2, (0.1, 0.1))
+    rhomb = replace(rhomb, assemblies=(pf.Assembly("open", {"crank": 0.5, "coupler": 0.0, "rocker": 0.5}),))
+    motion = pf.kinematics(rhomb, "O", start=math.radians(10), end=math.radians(90))
+    assert (
+        motion.features.trails["coupler.P"]
+        == pf.kinematics(rhomb, "O", start=0.2, end=1.5).features.trails["coupler.P"]
+    )
+    # All points of the coupler move on circles as the crank's pin does.
+    data = pf.motion_dataset(motion)
+    speed = np.linalg.norm(data["point_velocity"].sel(point="coupler.P").values, axis=1)
+    assert speed == pytest.approx(0.2, abs=1e-12)
+
+
+def test_a_named_drive_leaves_the_prescribed_motions_of_other_freedoms():
+    five = pf.load("five_bar").mechanism
+    both = driven_by(five, A1=SWING, A2=SWING)
+    motion = pf.kinematics(replace(both, assemblies=five.assemblies), "A1", start=2.0, end=2.2)
+    assert [one.joint for one in motion.system.mechanism.prescribed] == ["A1", "A2"]
+    assert motion.features.freedoms == 2
+
+
+def test_a_flywheel_needs_enough_samples_and_a_torque_that_repeats():
+    model = pf.load("four_bar")
+    with pytest.raises(InputError, match="samples: too few samples for a flywheel"):
+        pf.flywheel(pf.torques(model, samples=5), 0.05)
+    sine = pf.SampledAngle(
+        lambda t: np.sin(3.3 * t), lambda t: 3.3 * np.cos(3.3 * t), lambda t: -10.89 * np.sin(3.3 * t)
+    )
+    pushed = replace(model.mechanism, loads=(pf.AppliedTorque("push", pf.PointRef("rocker", "B"), sine),))
+    with pytest.raises(InputError, match="the torque does not repeat after a turn"):
+        pf.flywheel(pf.torques(pushed), 0.05)
 
 
 ROCKER = """
@@ -414,7 +484,7 @@ def test_the_commands_write_results_that_other_commands_take(rocker, tmp_path):
         ),
         (["kinematics", "FILE", "--drive", "O", "--speed", "nan"], "--speed"),
         (["kinematics", "FILE", "--drive", "Q", "--to", "3"], "--drive: Q reaches its limit of reach, 2.49809 rad"),
-        (["torques", "four_bar", "--fluctuation", "0"], "--fluctuation: not positive"),
+        (["torques", "four_bar", "--fluctuation", "0"], "--fluctuation: not between 0 and 1"),
         (["torques", "four_bar", "--drive", "Q", "--fluctuation", "0.1"], "--fluctuation: a flywheel needs a drive"),
     ],
 )

@@ -65,7 +65,7 @@ def test_modes_are_named_by_a_word():
     assert (mode.name, mode.motors, mode.follows) == ("++ servo", ("left", "right"), True)
     assert following(mode) is mode
     assert parse_mode(mechanism, "++") == replace(mode, name="++", follows=False)
-    for wrong in ("servo", "++ follow", "+ servo", "++servo"):
+    for wrong in ("servo", "++ follow", "+ servo", "++servo", "++ servo servo"):
         with pytest.raises(InputError, match="not an actuation mode"):
             parse_mode(mechanism, wrong)
 

@@ -22,6 +22,8 @@ from .request import command_provenance, locating_errors, of_assembly, requested
 from .run_lines import load_lines
 from .tables import PlainConsole, print_tables
 
+_EXAMPLES = {"rad": "90 deg", "m": "50 mm", "rad/s": "60 rpm", "m/s": "20 mm/s"}
+
 
 def kinematics_command(request: KinematicsRequest) -> int:
     """Compute a driven motion, print it and, with --out, write files; return the exit code."""
@@ -66,6 +68,9 @@ def _quantities(model: Model, request: KinematicsRequest) -> dict[str, float]:
             try:
                 found[name] = number_in(text, wanted)
             except InputError as error:
+                if error.problem.startswith("not a number"):
+                    remedy = f'write a number in {wanted}, or one with its unit, such as "{_EXAMPLES[wanted]}"'
+                    raise InputError("not a quantity", field=name, value=text, remedy=remedy) from None
                 raise error.at(name) from None
     return found
 

@@ -59,9 +59,14 @@ class Drive:
     reach: tuple[float | None, float | None] = (None, None)
 
     @property
+    def turns(self) -> float:
+        """Number of turns; zero for a travel."""
+        return abs(self.end - self.start) / (2.0 * math.pi) if self.unit == "rad" else 0.0
+
+    @property
     def full_turn(self) -> bool:
         """Whether the joint makes a whole turn, after which the motion repeats."""
-        return self.unit == "rad" and math.isclose(abs(self.end - self.start), 2.0 * math.pi, rel_tol=1e-9)
+        return math.isclose(self.turns, 1.0, rel_tol=1e-9)
 
     @property
     def duration(self) -> float:

@@ -28,6 +28,8 @@ _SHARP = 4.0 * np.finfo(float).eps
 _LOCATED = 1e-9
 # Speed at a cusp, as a part of the largest speed of the point; smallest angle at which two branches cross [rad].
 _STILL, _CROSSING = 1e-8, 1e-3
+# Distance of a path after a rest from that before it, as a part of the way, below which it is the same path.
+_SAME_PATH = 1e-4
 # A curve with more crossings retraces itself.
 _MOST_CROSSINGS = 50
 
@@ -160,6 +162,9 @@ def _at(motion: ExactMotion, value: float, t: float) -> Extreme:
 
 
 def _root(function: Callable[[float], float], a: float, b: float) -> float:
+    # A value that is zero to rounding may have either sign.
+    if function(a) * function(b) >= 0.0:
+        return a if abs(function(a)) < abs(function(b)) else b
     return float(scipy.optimize.brentq(function, a, b, xtol=_SHARP * max(abs(a), abs(b)), rtol=_SHARP))
 
 
@@ -303,17 +308,32 @@ def _trail(motion: ExactMotion, ref: PointRef) -> Trail:
         return float(np.sum(here.velocity * here.acceleration))
 
     gains = np.sum(path.velocity * path.acceleration, axis=1)
-    slowest = _sign_changes(solution.t, gains, _ZERO * float(np.max(np.abs(gains))), gain, repeats=_repeats(motion))
+    zero = _ZERO * fastest * float(np.max(np.linalg.norm(path.acceleration, axis=1)))
+    slowest = _sign_changes(solution.t, gains, zero, gain, repeats=_repeats(motion))
     cusps = []
     for t in sorted(slowest):
         here = there(t)
-        if np.linalg.norm(here.velocity) < _STILL * fastest:
+        if np.linalg.norm(here.velocity) < _STILL * fastest and not _retraced(motion, there, t):
             cusps.append(Cusp(_pair(here.position[0]), t, _at(motion, 0.0, t).drive))
     crunodes = []
     for t in _crossings(motion, path.position, there):
         where = _pair(there(t[0]).position[0])
         crunodes.append(Crunode(where, t, (_at(motion, 0.0, t[0]).drive, _at(motion, 0.0, t[1]).drive)))
     return Trail(str(ref), tuple(cusps), tuple(crunodes))
+
+
+def _retraced(motion: ExactMotion, there: Callable[[float], PointMotion], t: float) -> bool:
+    """Return whether a point that comes to rest goes back on its path, as where a drive reverses."""
+    times = motion.solution.t
+    step = min(2.0 * (times[1] - times[0]), t - times[0], times[-1] - t)
+    if not step > 0.0:
+        return True
+    rest, after = there(t).position, there(t + step).position
+    apart = scipy.optimize.minimize_scalar(
+        lambda back: float(np.linalg.norm(there(back).position - after)), bounds=(max(t - 2.0 * step, times[0]), t),
+        method="bounded", options={"xatol": _LOCATED * step},
+    )  # fmt: skip
+    return bool(apart.fun < _SAME_PATH * np.linalg.norm(after - rest))
 
 
 def _pair(xy: Array) -> tuple[float, float]:
@@ -339,7 +359,9 @@ def _crossings(
             move = np.linalg.solve(rates, (two.position - one.position)[0])
             times = np.clip(times + move, t[0], t[-1])
             if np.max(np.abs(move)) < 1e-13 * t[-1]:
-                found.append((float(times[0]), float(times[1])))
+                # A path that ends where it starts does not cross itself there.
+                if times[0] > _LOCATED * t[-1] or times[1] < (1.0 - _LOCATED) * t[-1]:
+                    found.append((float(times[0]), float(times[1])))
                 break
     return found
 

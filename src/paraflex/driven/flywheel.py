@@ -1,6 +1,5 @@
 """Flywheel that keeps the speed of a drive within a given fluctuation, from the torque over a turn."""
 
-import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,6 +12,8 @@ from .motion import DrivenMotion
 
 # Mean torques below this part of the largest torque are rounding errors.
 _ROUNDING = 1e-12
+# Largest change of the torque over a turn, as a part of the largest torque, and largest relative error of the inertia.
+_REPEATED, _COARSE = 1e-6, 0.05
 
 
 @dataclass(frozen=True)
@@ -59,8 +60,8 @@ def flywheel(motion: DrivenMotion, fluctuation: float) -> Flywheel:
     InputError
         The fluctuation is not positive, the drive makes no whole turn, or the motion has no loads.
     """
-    if not (math.isfinite(fluctuation) and fluctuation > 0.0):
-        raise InputError("not positive", field="fluctuation", value=fluctuation, remedy="give a ratio such as 0.02")
+    if not 0.0 < fluctuation < 1.0:
+        raise InputError("not between 0 and 1", field="fluctuation", value=fluctuation, remedy="give a ratio, say 0.02")
     drive = motion.drive
     if drive is None or not drive.full_turn:
         raise InputError(
@@ -70,10 +71,20 @@ def flywheel(motion: DrivenMotion, fluctuation: float) -> Flywheel:
     torque = drive_torques(motion.system, motion.solution.multipliers)[:, 0]
     if np.isnan(torque).any():
         raise InputError("the motion has no loads", field="motion", remedy="compute it by torques, with masses")
+    if abs(torque[-1] - torque[0]) > _REPEATED * float(np.max(np.abs(torque))):
+        raise InputError(
+            "the torque does not repeat after a turn", field="fluctuation", value=fluctuation,
+            remedy="leave out loads that change in time otherwise",
+        )  # fmt: skip
     angle = np.linspace(drive.start, drive.end, torque.size)
     energy, mean = _energy(angle, torque)
     inertia = energy / (fluctuation * drive.speed**2)
-    coarse = _energy(angle[::2], torque[::2])[0] / (fluctuation * drive.speed**2) if torque.size % 2 else math.nan
+    half = np.linspace(0, torque.size - 1, torque.size // 2 + 1).round().astype(int)
+    coarse = _energy(angle[half], torque[half])[0] / (fluctuation * drive.speed**2) if half.size > 3 else 0.0
+    if not abs(inertia - coarse) <= _COARSE * inertia:
+        raise InputError(
+            "too few samples for a flywheel", field="samples", value=torque.size, remedy="give more, say 361"
+        )
     return Flywheel(inertia, fluctuation, energy, mean, abs(inertia - coarse))
 
 

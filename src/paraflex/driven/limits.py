@@ -16,8 +16,8 @@ _CLOSED = 1e-13
 _FAR = 0.5
 
 
-def limit_of_reach(system: System, q: Array) -> float | None:
-    """Return the angle [rad] or travel [m] of the only drive at its limit of reach near a pose.
+def limit_of_reach(system: System, joint: str, q: Array) -> float | None:
+    """Return the angle [rad] or travel [m] of a driven joint at its limit of reach near a pose, other drives held.
 
     Without the drive's row the poses form a curve q(s). At a limit of reach the drive's coordinate is stationary along
     it; the secant method finds the root of its slope.
@@ -25,7 +25,9 @@ def limit_of_reach(system: System, q: Array) -> float | None:
     Parameters
     ----------
     system : System
-        System of a rigid mechanism with one drive and no redundant rows.
+        System of a rigid mechanism that its drives determine, without redundant rows.
+    joint : str
+        Joint of the drive.
     q : (n,) array
         Pose near the limit, with closed loops.
 
@@ -34,7 +36,7 @@ def limit_of_reach(system: System, q: Array) -> float | None:
     float or None
         Value of the drive's joint at the limit; None if there is no such limit nearby, as at a change point.
     """
-    (motion, row), *_ = driven_rows(system)
+    motion, row = next((one, row) for one, row in driven_rows(system) if one.joint == joint)
     others = np.delete(np.arange(system.m), row)
     signals = moment_signals(system.mechanism, 0.0)
     direction = _tangent(system, q, others)

@@ -11,12 +11,13 @@ import numpy as np
 from paraflex.arguments import checked_arguments, named_in_errors
 from paraflex.arrays import Array
 from paraflex.dynamics import System, assembled_position, build_system, dependence, reference_pose, still_signals
+from paraflex.dynamics.constraints import constraint_count
 from paraflex.dynamics.joint_coordinates import joint_value, value_text
 from paraflex.dynamics.stiffness import RestingForces
 from paraflex.errors import AssemblyError, InputError, Moment, UnreachablePathError
 from paraflex.findings import Finding
 from paraflex.formatting import quantity
-from paraflex.integrators import Solution
+from paraflex.integrators import Solution, check_times
 from paraflex.kernel.bodies import stored_energy
 from paraflex.kernel.constraints import constraint_values
 from paraflex.kernel.packed import make_scratch
@@ -26,7 +27,7 @@ from paraflex.mechanism.masses import with_any_masses
 from paraflex.mechanism.quantities import known
 from paraflex.motion import MotionRun
 from paraflex.paths import ModelWithPaths
-from paraflex.paths.loops import LoopClosure
+from paraflex.paths.loops import LoopClosure, no_long_steps
 from .assemblies import FoundAssembly, assemblies_of
 from .exact import NO_TASKS, Drive, ExactMotion, no_target
 from .features import KinematicFeatures, features_of
@@ -36,6 +37,12 @@ from .limits import limit_of_reach
 _MARGIN = 1e-3
 # Largest travel of a sliding drive whose range is not given, in sizes of the mechanism.
 _LONGEST_TRAVEL = 4.0
+# Speeds below this, and above its inverse, are refused [rad/s, m/s].
+_SLOWEST = 1e-12
+# Largest number of turns of a drive.
+_MOST_TURNS = 20.0
+# Longest step of a drive as a fraction of a turn, or of its travel; samples between which properties are located.
+_STEP, _FINE, _FINEST = 1.0 / 360.0, 361, 1441
 _GIVE_RANGE = "give the start and end of its travel"
 
 
@@ -66,8 +73,16 @@ class DrivenMotion(MotionRun):
 
     @cached_property
     def exact(self) -> ExactMotion:
-        """The motion at any time, exact to rounding."""
-        return ExactMotion(self.system, self.solution, self.drive, self.loops)
+        """The motion at any time, exact to rounding: over one turn of the drive, with samples of its own."""
+        drive, solution = self.drive, self.solution
+        if drive is not None and drive.turns > 1.0:
+            drive = replace(drive, end=drive.start + math.copysign(2.0 * math.pi, drive.end - drive.start))
+        end = float(solution.t[-1]) if drive is None else drive.duration
+        times = np.linspace(0.0, end, _FINE if drive is not None else int(np.clip(solution.t.size, _FINE, _FINEST)))
+        if times.size != solution.t.size or times[-1] != solution.t[-1]:
+            t, q, v, a = _followed(self.loops, times, solution.q[0], drive)
+            solution = replace(solution, t=t, q=q, v=v, a=a)
+        return ExactMotion(self.system, solution, drive, self.loops)
 
     @cached_property
     def features(self) -> KinematicFeatures:
@@ -128,7 +143,7 @@ def kinematics(
         The loops do not close.
     UnreachablePathError
         The drive cannot cover the range, because of a limit of reach or a change point; the error names its angle or
-        travel and carries the motion until there, or None.
+        travel.
     """
     light = with_any_masses(Mechanism.from_source(mechanism))
     if duration is None:
@@ -189,18 +204,18 @@ def _driven(
     assembly: str | None,
 ) -> DrivenMotion:
     began = time.perf_counter()
-    if samples < 2:
-        raise InputError("too few", field="samples", value=samples, remedy="give at least 2")
+    check_times(None, samples)
+    for name, value in (("start", start), ("end", end), ("speed", speed)):
+        if value is not None and not math.isfinite(value):
+            raise InputError("not a finite number", field=name, value=value, remedy="give it in SI units and radians")
     moved = standing(mechanism.rigid(), assembly)
     begun = LoopClosure(moved, 0.0, None, NO_TASKS)
     near = reference_pose(begun.system, moved.assembly(assembly))
     law = _chosen(moved, drive, start, end, speed, begun.system, near)
     if law is None:
-        if duration is None or not duration > 0.0:
-            raise InputError(
-                "is missing" if duration is None else "not positive", field="duration", value=duration,
-                remedy="give it in seconds, or name a drive",
-            )  # fmt: skip
+        if duration is None:
+            raise InputError("is missing", field="duration", remedy="give it in seconds, or name a drive")
+        check_times(duration, None)
         loops, pose = _loops(moved, near, duration)
         arrays = _followed(loops, np.linspace(0.0, duration, samples), pose)
     else:
@@ -234,6 +249,14 @@ def _chosen(
         motors = [motor.joint for motor in mechanism.motors] or moving
         if prescribed and not given:
             return None
+        free = 3 * len(mechanism.bodies) - constraint_count(replace(mechanism, prescribed=()))
+        if free > 1 or not moving:
+            raise InputError(
+                f"{free} degrees of freedom need as many prescribed motions" if moving else "no joint moves",
+                field="drive", value=len(prescribed) if moving else None,
+                remedy="add a [prescribed.NAME] table for each; start, end and speed are for one drive"
+                if moving else "flexures move by bending: paraflex statics",
+            )  # fmt: skip
         if prescribed or len(motors) != 1:
             also = "; paraflex run plans a motion along a path" if mechanism.end_effector else ""
             raise InputError(
@@ -252,10 +275,10 @@ def _chosen(
     unit = "m" if one.slides else "rad"
     if speed is None:
         speed = abs(steadily.speed) if steadily is not None and steadily.speed else 1.0
-    if not (math.isfinite(speed) and speed > 0.0):
-        raise InputError(
-            "not positive", field="speed", value=speed, remedy=f"give it in {unit}/s; start and end give the direction"
-        )
+    if not _SLOWEST < speed < 1.0 / _SLOWEST:
+        problem = "of no machine" if speed > 0.0 else "not positive"
+        remedy = f"give it in {unit}/s; the range from start to end gives the direction"
+        raise InputError(problem, field="speed", value=speed, remedy=remedy)
     backwards = steadily is not None and steadily.speed < 0.0
     if start is None:
         start = joint_value(system, joint, pose)
@@ -263,8 +286,14 @@ def _chosen(
     if end is not None and end == start:
         raise InputError("the drive does not move", field="end", value=end, remedy="give another value than the start")
     last = start + (-turn if backwards else turn) if end is None else end
-    motor = next((each.name for each in mechanism.motors if each.joint == joint), joint)
-    return Drive(before.name if before else motor, joint, start, last, speed, unit)
+    found = Drive(joint if before is None else before.name, joint, start, last, speed, unit)
+    if found.turns > _MOST_TURNS or max(abs(start), abs(last)) > _MOST_TURNS * max(turn, 2.0 * math.pi):
+        example = {"rad": "90 deg", "m": "50 mm"}[unit]
+        raise InputError(
+            f"more than {_MOST_TURNS:g} turns" if unit == "rad" else "too far", field="start" if end is None else "end",
+            value=start if end is None else end, remedy=f'in another unit? It is in {unit}, or write "{example}"',
+        )  # fmt: skip
+    return found
 
 
 def _loops(mechanism: Mechanism, pose: Array, end: float) -> tuple[LoopClosure, Array]:
@@ -291,14 +320,18 @@ def _loops(mechanism: Mechanism, pose: Array, end: float) -> tuple[LoopClosure, 
 
 
 def _with_drive(mechanism: Mechanism, law: Drive) -> Mechanism:
-    """Return the mechanism with a drive instead of its prescribed motions, and of a motor at the same joint.
+    """Return the mechanism with a drive instead of the prescribed motion, and of a motor, at the same joint.
 
-    Motors with actuators stay, as their rotors have inertia.
+    Other prescribed motions are left out if the mechanism has one degree of freedom. Motors with actuators stay, as
+    their rotors have inertia.
     """
     if not mechanism.actuators:
         motors = tuple(one for one in mechanism.motors if one.joint != law.joint)
         mechanism = replace(mechanism, motors=motors, modes=())
-    return replace(mechanism, prescribed=(PrescribedAngle(law.name, law.joint, law.profile),))
+    others = tuple(one for one in mechanism.prescribed if one.joint != law.joint)
+    if 3 * len(mechanism.bodies) - constraint_count(replace(mechanism, prescribed=())) < 1 + len(others):
+        others = ()
+    return replace(mechanism, prescribed=(PrescribedAngle(law.name, law.joint, law.profile), *others))
 
 
 def _ranged(mechanism: Mechanism, law: Drive, pose: Array, *, fixed: bool) -> tuple[LoopClosure, Array, Drive]:
@@ -314,7 +347,7 @@ def _ranged(mechanism: Mechanism, law: Drive, pose: Array, *, fixed: bool) -> tu
     for way in (law, replace(law, end=2.0 * law.start - law.end)):
         there = LoopClosure(_with_drive(mechanism, way), way.duration, None, NO_TASKS)
         stopped = _reached(there, way, pose)
-        limit = None if stopped is None else limit_of_reach(there.system, stopped)
+        limit = None if stopped is None else limit_of_reach(there.system, law.joint, stopped)
         if limit is None:
             raise _barred(way, there, stopped, None)
         ends.append(limit)
@@ -329,20 +362,19 @@ def _ranged(mechanism: Mechanism, law: Drive, pose: Array, *, fixed: bool) -> tu
     return LoopClosure(_with_drive(mechanism, law), law.duration, None, NO_TASKS), pose, law
 
 
-def _grid(duration: float) -> Array:
-    return np.linspace(0.0, duration, 181)
-
-
 def _reached(loops: LoopClosure, law: Drive, pose: Array) -> Array | None:
     """Return the last pose with closed loops before the end of a drive's travel; None if it covers all of it."""
-    times = _grid(law.duration)
+    times = np.linspace(0.0, law.duration, 181)
     found = loops.follow(no_target, times, np.ones(times.size, dtype=bool), pose.copy())
     return None if found.closed else found.last
 
 
 def _followed(loops: LoopClosure, times: Array, pose: Array, law: Drive | None = None) -> tuple[Array, ...]:
     """Return times, coordinates, velocities and accelerations along the whole motion."""
-    found = loops.follow(no_target, times, np.ones(times.size, dtype=bool), pose.copy())
+    grid, keep = times, np.ones(times.size, dtype=bool)
+    if law is not None:
+        grid, keep = no_long_steps(times, _STEP * law.duration / max(law.turns, 1.0))
+    found = loops.follow(no_target, grid, keep, pose.copy())
     if not found.closed:
         raise _barred(law, loops, found.last, found.stopped)
     return found.arrays[:4]
@@ -353,7 +385,7 @@ def _barred(law: Drive | None, loops: LoopClosure, last: Array | None, stopped: 
     system = loops.system
     q = last if last is not None else np.zeros(system.n)
     drives = ", ".join(f"{one.joint} at {value_text(system, one.joint, q)}" for one in system.mechanism.prescribed)
-    limit = limit_of_reach(system, q) if law is not None and last is not None else None
+    limit = limit_of_reach(system, law.joint, q) if law is not None and last is not None else None
     if limit is not None and law is not None:
         cause = f"{law.joint} reaches its limit of reach, {quantity(limit, law.unit, digits=6)},"
     else:

@@ -29,6 +29,7 @@ def kinematics_tables(data: xr.Dataset) -> Iterator[Table]:
     if found:
         for title, unit in (("Angles of joints", "rad"), ("Travels of joints", "m")):
             yield _joints(data, found, title, unit)
+        yield _dead_points(found)
         yield _transmissions(found)
         yield _points(data)
         yield _special(found)
@@ -47,10 +48,12 @@ def _joints(data: xr.Dataset, found: Found, title: str, unit: str) -> Table:
     rows, places = [], data["time"].values if found["drive"] is None else _drive_values(data, found)
     for joint in names_of(data, "joint"):
         values = data["joint_coordinate"].sel(joint=joint).values
+        values = np.where(np.abs(values) < _SAME * np.ptp(values), 0.0, values)
         if found["joint_units"].get(joint) != unit or not np.ptp(values) > _SAME:
             continue
         ends = [(float(values[k]), float(places[k])) for k in (int(np.argmin(values)), int(np.argmax(values)))]
         ends += [(end["value"], end[key]) for end in found["dead_points"].get(joint, ())]
+        ends = [(0.0 if abs(value) < _SAME * np.ptp(values) else value, at) for value, at in ends]
         rows.append((joint, *min(ends), *max(ends), found["time_ratios"].get(joint)))
     columns = list(zip(*rows, strict=True)) if rows else [()] * 6
     at = f"at {where}"
@@ -63,6 +66,19 @@ def _joints(data: xr.Dataset, found: Found, title: str, unit: str) -> Table:
 def _drive_values(data: xr.Dataset, found: Found) -> np.ndarray:
     drive = found["drive"]
     return drive["start"] + data["time"].values * np.sign(drive["end"] - drive["start"]) * drive["speed"]
+
+
+def _dead_points(found: Found) -> Table:
+    """Return the table of the dead points of joints that have more than two."""
+    key, where, unit = _place(found)
+    rows = [(joint, found["joint_units"][joint], each["value"], each[key])
+            for joint, ends in found["dead_points"].items() if len(ends) > 2 for each in ends]  # fmt: skip
+    return Table("Dead points", [
+        Column("joint", [row[0] for row in rows]),
+        Column("angle", [row[2] if row[1] == "rad" else None for row in rows], "rad"),
+        Column("travel", [row[2] if row[1] == "m" else None for row in rows], "m"),
+        Column(f"at {where}", [row[3] for row in rows], unit),
+    ]).filled()  # fmt: skip
 
 
 def _transmissions(found: Found) -> Table:

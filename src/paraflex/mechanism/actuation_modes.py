@@ -32,7 +32,8 @@ def mode_of_signs(mechanism: Mechanism, signs: str) -> ActuationMode:
             "not an actuation mode",
             field="mode",
             value=signs,
-            remedy=f"write one + or - for each of the {len(names)} motors ({', '.join(names)}), or motor names",
+            remedy=f"write one + or - for each of the {len(names)} motors ({', '.join(names)}), or motor names, and "
+            f'"{SERVO}" behind them for motors that follow the plan',
         )
     return ActuationMode(plain, tuple(name for name, sign in zip(names, plain, strict=True) if sign == "+"))
 
@@ -64,7 +65,7 @@ def parse_mode(mechanism: Mechanism, text: str) -> ActuationMode:
         if text == mode.name:
             return mode
     plain, space, last = text.strip().rpartition(" ")
-    if space and last == SERVO:
+    if space and last == SERVO and not plain.endswith(f" {SERVO}"):
         return following(parse_mode(mechanism, plain))
     names = [part.strip() for part in text.split(",")]
     if all(name in {motor.name for motor in mechanism.motors} for name in names):

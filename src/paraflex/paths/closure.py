@@ -14,11 +14,11 @@ from paraflex.dynamics.points import point_motion
 from paraflex.errors import AssemblyError, InputError, Moment, NumericalError, UnreachablePathError
 from paraflex.kernel.arrays import apart
 from paraflex.kernel.closure import LOOPS_CLOSED, task_values
-from paraflex.limits import INSTANTS, solvable
+from paraflex.limits import solvable
 from paraflex.mechanism import Assembly, Mechanism
 from paraflex.mechanism.members import TASK_COORDINATES
 from paraflex.mechanism.poses import local_points
-from .loops import LoopClosure
+from .loops import LoopClosure, no_long_steps
 from .paths import KnownPath, Path, PathMotion, turning_of
 from .reach import PoseSearch, Shortfall
 
@@ -215,7 +215,7 @@ class PathFollower:
     def __call__(self, times: Sequence[float] | Array) -> RigidMotion:
         """Return the motion at times (k,), ascending [s]; see `follow_path` for its errors."""
         times = np.ascontiguousarray(times, dtype=float)
-        grid, keep = _no_long_steps(times)
+        grid, keep = no_long_steps(times, _LONGEST_STEP)
         pose = self.closure.approach(self.path, self.assembled, times[0], times[-1])
         return self.closure.walk(self.path, pose, grid, keep)
 
@@ -256,24 +256,6 @@ def reach_shortfall(
     if times is None:
         return closure.shortfall(path, 0.0, path.duration, pose)
     return closure.distances(path, np.asarray(times, dtype=float), pose)
-
-
-def _no_long_steps(times: Array) -> tuple[Array, Mask]:
-    """Return times refined to the longest closure step, and which of them were given."""
-    pieces = np.maximum(1.0, np.ceil(np.diff(times) / _LONGEST_STEP * (1.0 - 1e-9)))
-    if np.sum(pieces) > INSTANTS:
-        raise InputError(
-            "too long for a motion along a path", field="duration", value=float(times[-1] - times[0]),
-            remedy=f"at most {INSTANTS * _LONGEST_STEP:g} s: loops are closed every {_LONGEST_STEP:g} s",
-        )  # fmt: skip
-    pieces = pieces.astype(int)
-    first = np.concatenate([[0], np.cumsum(pieces)])
-    step = np.repeat(np.diff(times) / pieces, pieces)
-    within = np.arange(first[-1]) - np.repeat(first[:-1], pieces)
-    grid = np.append(np.repeat(times[:-1], pieces) + within * step, times[-1:])
-    keep = np.zeros(grid.size, dtype=bool)
-    keep[first] = True
-    return grid, keep
 
 
 class PathClosure(LoopClosure):

@@ -9,9 +9,11 @@ import numpy as np
 from paraflex.arrays import Array, Brief, Indices, Mask
 from paraflex.dynamics import System, assembled_position, build_system, records, reference_pose, still_signals
 from paraflex.dynamics.system import DENSE_ROWS
+from paraflex.errors import InputError
 from paraflex.kernel.arrays import apart
 from paraflex.kernel.closure import LOOPS_CLOSED, LOOPS_SINGULAR, close_path, make_closure_scratch
 from paraflex.kernel.packed import MARKER, PackedSystem, Signals
+from paraflex.limits import INSTANTS
 from paraflex.mechanism import Assembly, Mechanism, PointRef, with_actuators
 from .sparse_closure import SparseClosure
 
@@ -120,6 +122,24 @@ class LoopClosure:
     @cached_property
     def _sparse(self) -> SparseClosure:
         return SparseClosure(self.system, self.packed, self.signals, self.marker, self.coordinates)
+
+
+def no_long_steps(times: Array, longest: float) -> tuple[Array, Mask]:
+    """Return times refined to the longest step [s], and which of them were given."""
+    pieces = np.maximum(1.0, np.ceil(np.diff(times) / longest * (1.0 - 1e-9)))
+    if np.sum(pieces) > INSTANTS:
+        raise InputError(
+            "too long for a motion along a path", field="duration", value=float(times[-1] - times[0]),
+            remedy=f"at most {INSTANTS * longest:g} s: loops are closed every {longest:g} s",
+        )  # fmt: skip
+    pieces = pieces.astype(int)
+    first = np.concatenate([[0], np.cumsum(pieces)])
+    step = np.repeat(np.diff(times) / pieces, pieces)
+    within = np.arange(first[-1]) - np.repeat(first[:-1], pieces)
+    grid = np.append(np.repeat(times[:-1], pieces) + within * step, times[-1:])
+    keep = np.zeros(grid.size, dtype=bool)
+    keep[first] = True
+    return grid, keep
 
 
 def with_marker(system: System, ref: PointRef) -> tuple[PackedSystem, int]:

@@ -89,5 +89,8 @@ def motion_dataset(
         out = with_controllers(out, [run.controllers], [motor.name for motor in mechanism.motors])
     if isinstance(run, DrivenMotion):
         add_kinematics(out, run)
-    keep_findings(out, [*findings, *implausible_numbers(mechanism), *beyond_range(run.validity), *run.findings])
+    # Masses of kinematics only stand in for those that are not given.
+    weighed = not isinstance(run, DrivenMotion) or not np.isnan(solution.multipliers).all()
+    numbers = implausible_numbers(mechanism) if weighed else ()
+    keep_findings(out, [*findings, *numbers, *beyond_range(run.validity), *run.findings])
     return out
