@@ -7,6 +7,7 @@ import re
 import stat
 import sys
 import warnings
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
 
@@ -35,6 +36,14 @@ for line in sys.stdin:
     elif "@@end" in line:
         break
 """
+
+
+@pytest.fixture(autouse=True)
+def no_settings() -> Iterator[None]:
+    """Settings of a user who has none, whatever other tests of the process left."""
+    with matplotlib.rc_context():
+        matplotlib.rcdefaults()
+        yield
 
 
 @pytest.fixture(scope="module")

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 import xarray as xr
 
-from paraflex.arrays import Array
+from paraflex.arrays import Array, brief
 from paraflex.errors import InputError, listed, suggestion
 from paraflex.formatting import peak, text_symbol
 from paraflex.results.loads import sliding_joints
@@ -33,6 +33,8 @@ class Abscissa(NamedTuple):
     axis: Axis
     values: Array
     moves: bool
+
+    __repr__ = brief
 
 
 def abscissae(data: xr.Dataset) -> list[Abscissa]:

@@ -367,11 +367,16 @@ class BeamTable(_table_of(FlexibleBeam, BODY_KINDS, reference=ReferenceName | No
 
 
 class RigidTable(_table_of(RigidBody, BODY_KINDS)):
-    """A rigid body, also if its table has no `type` and only fields of rigid bodies."""
+    """A rigid body, also if its table has points, no `type`, and only fields of rigid bodies."""
 
 
 def _with_type(value: Any) -> Any:
-    if isinstance(value, dict) and "type" not in value and value.keys() <= RigidTable.model_fields.keys():
+    if (
+        isinstance(value, dict)
+        and "points" in value
+        and "type" not in value
+        and value.keys() <= RigidTable.model_fields.keys()
+    ):
         return {"type": "rigid"} | value
     return value
 
