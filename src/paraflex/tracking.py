@@ -4,10 +4,8 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from enum import Enum
 from functools import cached_property, partial
-from itertools import pairwise
 
 import numpy as np
-import scipy
 
 from .actuation import (
     Effort,
@@ -18,12 +16,14 @@ from .actuation import (
     electrical,
     electrical_findings,
     plan_torques,
+    planned_profiles,
     required_effort,
 )
 from .arguments import checked_arguments, named_in_errors
 from .arrays import Array, Brief
 from .display import Played
 from .dynamics import (
+    BrakedSystem,
     State,
     System,
     balanced_state,
@@ -32,18 +32,16 @@ from .dynamics import (
     held_joints,
     joint_motions,
     pack_signals,
-    piecewise_quintic,
     still_signals,
     undeformed_motion,
 )
 from .dynamics.points import PointMotion, marker_position, point_motion
-from .dynamics.quasi_static import joint_accelerations
 from .errors import InputError, IntegrationError, ResultWarning, as_enum
 from .findings import Finding, warn_of
 from .integrators import IntegrationOptions, Method, Solution, check_times, choose
 from .integrators.beam_ends import leave_beam
 from .integrators.between import SAMPLES
-from .mechanism import ActuationMode, Mechanism, SampledAngle, finite_segments, parse_mode, standing
+from .mechanism import ActuationMode, Mechanism, Motor, finite_segments, parse_mode, standing
 from .mechanism.profiles import stops
 from .paths import ModelWithPaths, Path, RigidMotion, path_follower
 from .validity import Driven, Following, Validity, assess, implausible_results, warn, with_likely_cause
@@ -51,8 +49,6 @@ from .validity import Driven, Following, Validity, assess, implausible_results, 
 # Times closer than this fraction of the run are merged: a knot beside a sample would force a step of almost zero
 # length.
 _SAME_TIME = 1e-9
-# The motion just before a knot of the path is that earlier by this fraction of the run.
-_BEFORE = 1e-8
 
 
 class Ending(Enum):
@@ -476,16 +472,14 @@ def _follow(
 ) -> TrackingRun:
     """Move along the path with the joints of the active motors held on the planned motion."""
     motors = [motor for motor in task.mechanism.motors if motor.name in torques.mode.motors]
-    profiles = planned_profiles(task, torques, [motor.joint for motor in motors])
+    profiles = planned_profiles(task.plan, torques, [motor.joint for motor in motors])
     held = held_joints(task.system, task.start, profiles)
     signals, knots = still_signals(held.system.mechanism, float(task.motion.t[-1]))
     stops = np.unique(np.concatenate([path_stops(torques.knots, task.mechanism), knots]))
     own = [held.system.rows.index(row) for row in task.system.rows]
-    columns = [task.mechanism.motors.index(motor) for motor in motors]
 
     def whole(solution: Solution) -> TrackingRun:
-        holding = np.zeros((solution.t.size, len(task.mechanism.motors)))
-        holding[:, columns] = held.holding(solution.multipliers)
+        holding = _holding(task, motors, held, solution)
         errors = solution.multiplier_errors
         solution = replace(
             solution,
@@ -501,39 +495,11 @@ def _follow(
         raise
 
 
-def planned_profiles(task: TrackingTask, torques: FeedForward, joints: Sequence[str]) -> dict[str, SampledAngle]:
-    """Return the planned angle or travel of joints over time, quintic between the instants of the plan.
-
-    The acceleration may jump at the knots of the path.
-    """
-    knots, inner = torques.knots, torques.knots[1:-1]
-    # The motion before a knot is that a little earlier, extrapolated.
-    early = _BEFORE * (knots[-1] - knots[0])
-    times = np.unique(np.concatenate([torques.times, inner - early]))
-    rigid = task.plan.follow(times)
-    found = {}
-    for joint in joints:
-        value, rate, acceleration = joint_accelerations(rigid.system, joint, rigid.q, rigid.v, rigid.a)
-        breaks, coefficients = [], []
-        for a, b in pairwise(knots):
-            here = (times >= a) & (times < b - 0.5 * early)
-            if b == knots[-1]:
-                here |= times == b
-            t, end = times[here].copy(), b - times[here][-1]
-            parts = [x[here].copy() for x in (value, rate, acceleration)]
-            parts[0][-1] += end * (parts[1][-1] + 0.5 * end * parts[2][-1])
-            parts[1][-1] += end * parts[2][-1]
-            t[-1] = b
-            signal = piecewise_quintic(t, parts[0], parts[1], parts[2])
-            breaks.append(signal.breaks[:-1])
-            coefficients.append(signal.coefficients)
-        polynomial = scipy.interpolate.PPoly(
-            np.concatenate(coefficients).T[::-1], np.concatenate([*breaks, knots[-1:]])
-        )
-        found[joint] = SampledAngle(
-            polynomial, polynomial.derivative(), polynomial.derivative(2), tuple(inner.tolist())
-        )
-    return found
+def _holding(task: TrackingTask, motors: Sequence[Motor], held: BrakedSystem, solution: Solution) -> Array:
+    """Return the torques (k, motors) of all motors in a run in which some hold their joints."""
+    holding = np.zeros((solution.t.size, len(task.mechanism.motors)))
+    holding[:, [task.mechanism.motors.index(motor) for motor in motors]] = held.holding(solution.multipliers)
+    return holding
 
 
 def _drive_and_hold(
@@ -552,12 +518,10 @@ def _drive_and_hold(
     braked = brake(task.system, State(float(until[-1]), driven.q[-1], driven.v[-1]), [motor.joint for motor in motors])
     signals, knots = still_signals(braked.system.mechanism, float(times[-1]))
     own = [braked.system.rows.index(row) for row in task.system.rows]
-    columns = [task.mechanism.motors.index(motor) for motor in motors]
 
     def whole(held: Solution) -> TrackingRun:
         solution = _joined(driven, held, count, held.multipliers[:, own], braked.energy)
-        holding = np.zeros((held.t.size, len(task.mechanism.motors)))
-        holding[:, columns] = braked.holding(held.multipliers)
+        holding = _holding(task, motors, braked, held)
         holding = np.concatenate([torques.evaluate(driven.t[:count]), holding[: held.samples]])
         return run_of(solution, holding=holding)
 

@@ -8,3 +8,4 @@ from .allocation import (
 )
 from .electrical import Electrical as Electrical, electrical as electrical, electrical_findings as electrical_findings
 from .feed_forward import FeedForward as FeedForward, TorquePlan as TorquePlan, plan_torques as plan_torques
+from .planned import planned_profiles as planned_profiles

@@ -1,5 +1,6 @@
 """`paraflex kinematics` and `paraflex torques`: motions of a rigid mechanism that its drives determine."""
 
+from collections.abc import Mapping
 from dataclasses import fields
 from typing import Any
 
@@ -14,6 +15,7 @@ from paraflex.files.fields import number_in
 from paraflex.formatting import number, quantity
 from paraflex.results import motion_dataset, motion_summary
 from paraflex.results.kinematics import add_kinematics
+from paraflex.results.loads import load_figures
 from . import COMPLETE
 from .commands.models import KinematicsRequest, TorquesRequest
 from .commands.requests import flagged
@@ -99,7 +101,8 @@ def _print(out: PlainConsole, data: xr.Dataset) -> None:
             out.print_lines(f"limits of reach of {drive['joint']}: {low} and {high}; the range ends beside them")
     print_tables(out, kinematics_tables(data))
     if np.isfinite(data["kinetic_energy"].values).any():
-        out.print_lines(*load_lines({"": motion_summary(data)["loads"]}), *_shaking(data))
+        loads = load_figures(data)
+        out.print_lines(*load_lines({"": loads}), _shaking(loads["frame"]))
     wheel = found.get("flywheel")
     if wheel is not None:
         out.print_lines(
@@ -109,12 +112,9 @@ def _print(out: PlainConsole, data: xr.Dataset) -> None:
         )
 
 
-def _shaking(data: xr.Dataset) -> list[str]:
+def _shaking(frame: Mapping[str, float]) -> str:
     """Return a sentence on the largest force and moment on the ground."""
-    times = data["time"].values
-    force = np.linalg.norm(data["frame_force"].transpose("time", "axis").values, axis=1)
-    moment = np.abs(data["frame_moment"].values)
-    found = (("force", force, "N"), ("moment about its origin", moment, "N m"))
-    parts = [f"{word} {quantity(float(np.max(values)), unit)} at t = {number(float(times[np.argmax(values)]))} s"
-             for word, values, unit in found]  # fmt: skip
-    return [f"on the ground: largest {' and '.join(parts)}"]
+    parts = [f"{word} {quantity(frame[f'{name}_max'], unit)} at t = {number(frame[f'{name}_time'])} s"
+             for word, name, unit in (("force", "force", "N"),
+                                      ("moment about its origin", "moment", "N m"))]  # fmt: skip
+    return f"on the ground: largest {' and '.join(parts)}"

@@ -56,7 +56,7 @@ class WatchServer(ThreadingHTTPServer):
         super().__init__(("127.0.0.1", 0), _Answers)
         self.place: str = f"/{secrets.token_urlsafe(16)}/"
         self.address: str = f"http://127.0.0.1:{self.server_port}{self.place}"
-        self._request, self._told = request, ""
+        self._request, self._printed = request, ""
         self._lock, self._context = threading.Lock(), copy_context()
 
     def _stamp(self) -> str:
@@ -80,9 +80,9 @@ class WatchServer(ThreadingHTTPServer):
                 found = self._context.run(self._drawn, settings)
             except ParaflexError as error:
                 found = {"error": str(error)}
-            told, self._told = self._told, found.get("error", "")
-            if self._told != told:
-                typer.echo(f"error: {self._told}" if self._told else "drawn again", err=bool(self._told))
+            before, self._printed = self._printed, found.get("error", "")
+            if self._printed != before:
+                typer.echo(f"error: {self._printed}" if self._printed else "drawn again", err=bool(self._printed))
         return found
 
     def _drawn(self, settings: Sequence[str]) -> dict[str, Any]:

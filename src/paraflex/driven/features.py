@@ -157,8 +157,12 @@ def _followers(motion: ExactMotion) -> list[str]:
     return [one.name for one in motion.system.mechanism.joints if one.moves and one.name not in _driven(motion)]
 
 
+def _drive_at(motion: ExactMotion, t: float) -> float | None:
+    return None if motion.drive is None else motion.drive.at(t)
+
+
 def _at(motion: ExactMotion, value: float, t: float) -> Extreme:
-    return Extreme(value, t, None if motion.drive is None else motion.drive.at(t))
+    return Extreme(value, t, _drive_at(motion, t))
 
 
 def _root(function: Callable[[float], float], a: float, b: float) -> float:
@@ -314,11 +318,11 @@ def _trail(motion: ExactMotion, ref: PointRef) -> Trail:
     for t in sorted(slowest):
         here = there(t)
         if np.linalg.norm(here.velocity) < _STILL * fastest and not _retraced(motion, there, t):
-            cusps.append(Cusp(_pair(here.position[0]), t, _at(motion, 0.0, t).drive))
+            cusps.append(Cusp(_pair(here.position[0]), t, _drive_at(motion, t)))
     crunodes = []
     for t in _crossings(motion, path.position, there):
         where = _pair(there(t[0]).position[0])
-        crunodes.append(Crunode(where, t, (_at(motion, 0.0, t[0]).drive, _at(motion, 0.0, t[1]).drive)))
+        crunodes.append(Crunode(where, t, (_drive_at(motion, t[0]), _drive_at(motion, t[1]))))
     return Trail(str(ref), tuple(cusps), tuple(crunodes))
 
 

@@ -45,9 +45,10 @@ def _place(found: Found) -> tuple[str, str, str]:
 def _joints(data: xr.Dataset, found: Found, title: str, unit: str) -> Table:
     """Return the table of the ranges of joints with coordinates in a unit that move, sharp where they reverse."""
     key, where, place_unit = _place(found)
-    rows, places = [], data["time"].values if found["drive"] is None else _drive_values(data, found)
+    rows, coordinates = [], data["joint_coordinate"]
+    places = data["time"].values if found["drive"] is None else coordinates.sel(joint=where).values
     for joint in names_of(data, "joint"):
-        values = data["joint_coordinate"].sel(joint=joint).values
+        values = coordinates.sel(joint=joint).values
         values = np.where(np.abs(values) < _SAME * np.ptp(values), 0.0, values)
         if found["joint_units"].get(joint) != unit or not np.ptp(values) > _SAME:
             continue
@@ -61,11 +62,6 @@ def _joints(data: xr.Dataset, found: Found, title: str, unit: str) -> Table:
         Column("joint", columns[0]), Column("lowest", columns[1], unit), Column(at, columns[2], place_unit),
         Column("highest", columns[3], unit), Column(at, columns[4], place_unit), Column("time ratio", columns[5]),
     ]).filled()  # fmt: skip
-
-
-def _drive_values(data: xr.Dataset, found: Found) -> np.ndarray:
-    drive = found["drive"]
-    return drive["start"] + data["time"].values * np.sign(drive["end"] - drive["start"]) * drive["speed"]
 
 
 def _dead_points(found: Found) -> Table:
