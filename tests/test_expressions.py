@@ -6,8 +6,8 @@ import math
 import pytest
 
 from paraflex.errors import InputError
+from paraflex.expressions.evaluate import ExpressionError, evaluate, evaluate_parameters
 from paraflex.files import library_file, load
-from paraflex.files.expressions import ExpressionError, evaluate, evaluate_parameters
 from paraflex.mechanism import raparm_i
 
 VALUES = {"l1": 0.25, "la": 0.1, "n": 3.0}

@@ -13,8 +13,8 @@ import xarray as xr
 from paraflex.cli.app import main
 from paraflex.elastodynamics import simulate_ked
 from paraflex.errors import InputError, IntegrationError, Moment, NumericalError, UnreachablePathError
+from paraflex.expressions.evaluate import ExpressionError, evaluate
 from paraflex.files import library_file, load
-from paraflex.files.expressions import ExpressionError, evaluate
 from paraflex.findings import Finding
 from paraflex.integrators import METHODS, IntegrationOptions
 from paraflex.integrators.methods import find_method

@@ -8,8 +8,8 @@ import scipy.interpolate
 
 from paraflex.dynamics import constant_signals, pack_signals
 from paraflex.errors import InputError
+from paraflex.expressions.evaluate import ExpressionError, evaluate_in_time
 from paraflex.files import load
-from paraflex.files.expressions import ExpressionError, evaluate_in_time
 from paraflex.integrators import IntegrationOptions
 from paraflex.kernel.signals import evaluate_signal
 from paraflex.mechanism import ConstantSpeed, PiecewiseProfile, SpeedProfile, TabulatedProfile

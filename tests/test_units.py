@@ -9,9 +9,9 @@ import pytest
 
 import paraflex as pf
 from paraflex.checks.check import file_findings
+from paraflex.expressions.dimensions import dimension_of, dimensions_of_parameters
+from paraflex.expressions.evaluate import ExpressionError, evaluate
 from paraflex.files import library_text, load_data, model_from
-from paraflex.files.dimensions import dimension_of, dimensions_of_parameters
-from paraflex.files.expressions import ExpressionError, evaluate
 from paraflex.files.fields import units_at
 from paraflex.files.schema import ModelTable
 from paraflex.units import FIELD_UNITS, UNITS, dimension_text, unit_named

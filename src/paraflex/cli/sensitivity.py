@@ -5,8 +5,8 @@ from dataclasses import replace
 from paraflex.designs.setting import Setting
 from paraflex.designs.units import check_unit_of
 from paraflex.errors import InputError
+from paraflex.expressions.evaluate import ExpressionError, evaluate
 from paraflex.figures.sensitivity import tables
-from paraflex.files.expressions import ExpressionError, evaluate
 from paraflex.folders import SENSITIVITY
 from paraflex.studies import load_sensitivities
 from paraflex.studies.sensitivity import FIGURES, LINES, TABLE

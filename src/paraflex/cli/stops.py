@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from paraflex.errors import InputError
-from paraflex.files.expressions import ExpressionError, evaluate
+from paraflex.expressions.evaluate import ExpressionError, evaluate
 from paraflex.files.fields import check_unit
 from paraflex.integrators import DeflectionLimit, Event, IntegrationOptions, JointLimit, SingularDistance, check_events
 from paraflex.mechanism import Mechanism

@@ -12,8 +12,8 @@ from typing import Any
 from paraflex.arrays import Brief
 from paraflex.equilibria.conditions import chosen_over
 from paraflex.errors import InputError, suggestion, within
+from paraflex.expressions.evaluate import ExpressionError, evaluate
 from paraflex.files import Model, StudyDefaults, library_names, model_from
-from paraflex.files.expressions import ExpressionError, evaluate
 from paraflex.files.generators import is_generated
 from paraflex.files.model import read_model
 from paraflex.files.overlay import Place, find_place, overlaid

@@ -9,8 +9,8 @@ import numpy as np
 from paraflex.control.laws.described import TABLE, ControllerDescription, check_controllers
 from paraflex.control.laws.kinds import LAWS
 from paraflex.errors import InputError, renamed, within
+from paraflex.expressions.evaluate import evaluate_parameters
 from paraflex.mechanism import Mechanism
-from .expressions import evaluate_parameters
 from .field_values import changed_fields, inexpressible
 from .profiles import components_table, read_components
 from .schema import ModelTable, TorqueTable

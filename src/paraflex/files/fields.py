@@ -9,10 +9,10 @@ from typing import Any, NamedTuple
 from pydantic import BaseModel
 
 from paraflex.errors import InputError
+from paraflex.expressions.dimensions import dimension_of, dimensions_of_parameters
+from paraflex.expressions.evaluate import ExpressionError, evaluate, expressed_in, names_in
 from paraflex.mechanism import JOINT_KINDS
 from paraflex.units import FIELD_UNITS, PLAIN, WHERE_IT_SLIDES, Dimension, dimension_text, quantities_in, unit_named
-from .dimensions import dimension_of, dimensions_of_parameters
-from .expressions import ExpressionError, evaluate, expressed_in, names_in
 
 # Path to a value in parsed TOML: keys of tables and indices of lists.
 Place = tuple[str | int, ...]

@@ -7,6 +7,7 @@ from typing import Any, cast, get_args
 from paraflex.control.shaping.shaped import ShapedPath
 from paraflex.control.shaping.shapers import Shaper, ShaperKind
 from paraflex.errors import InputError, within
+from paraflex.expressions.evaluate import evaluate_parameters
 from paraflex.limits import SHAPE_FUNCTIONS, at_most
 from paraflex.mechanism import (
     JOINT_KINDS,
@@ -36,7 +37,6 @@ from paraflex.mechanism.loads import InTime
 from paraflex.mechanism.quantities import known
 from paraflex.mechanism.sections import SHAPES
 from paraflex.paths import Path
-from .expressions import evaluate_parameters
 from .field_values import check_fields
 from .profiles import quantities, read_components, read_profile
 from .schema import (

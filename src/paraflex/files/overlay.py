@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 from paraflex.errors import InputError, suggestion
-from .expressions import ExpressionError, evaluate, evaluate_parameters
+from paraflex.expressions.evaluate import ExpressionError, evaluate, evaluate_parameters
 from .fields import Place, field_at, has_tables, is_table, leaves, takes_number, value_at
 from .schema import ModelTable
 

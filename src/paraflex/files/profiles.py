@@ -8,10 +8,10 @@ import numpy as np
 
 from paraflex.arrays import Array
 from paraflex.errors import InputError, renamed
+from paraflex.expressions.evaluate import check_in_time, evaluate, evaluate_in_time, expressed_in, is_constant, names_in
 from paraflex.mechanism import ConstantSpeed, PiecewiseProfile, SpeedProfile, TabulatedProfile, TimeProfile
 from paraflex.mechanism.loads import InTime
 from paraflex.mechanism.profiles import Interpolation, Values
-from .expressions import check_in_time, evaluate, evaluate_in_time, expressed_in, is_constant, names_in
 from .schema import PrescribedTable
 
 # Number of times at which a profile is evaluated as a check when it is read.

@@ -12,8 +12,8 @@ from typing import Any
 from pydantic import BaseModel, ValidationError
 
 from paraflex.errors import InputError, suggestion
+from paraflex.expressions.evaluate import evaluate_parameters
 from paraflex.limits import FILE_BYTES, KEY_PARTS, NAME_LETTERS
-from .expressions import evaluate_parameters
 from .fields import check_units, field_at
 
 # Patterns of numbers with a decimal comma, of unquoted values that TOML does not allow, and of strings and comments,

@@ -31,6 +31,7 @@ from paraflex.control.laws.described import ControllerDescription, References
 from paraflex.control.laws.kinds import LAWS
 from paraflex.control.shaping.shapers import Shaper
 from paraflex.equilibria.conditions import StaticsDefaults
+from paraflex.expressions.evaluate import CONSTANTS, ExpressionError, check_in_time, evaluate
 from paraflex.limits import LARGEST, TEXT_LETTERS, WHOLE
 from paraflex.mechanism import (
     JOINT_KINDS,
@@ -57,7 +58,6 @@ from paraflex.mechanism.quantities import joint_pair
 from paraflex.mechanism.sections import SHAPES
 from paraflex.paths import Circle, Line, Path, PointPath, Polygon, SequencePath, TabulatedPath
 from paraflex.units import QuantityName
-from .expressions import CONSTANTS, ExpressionError, check_in_time, evaluate
 from .study import StudyDefaults
 
 

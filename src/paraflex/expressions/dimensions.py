@@ -5,7 +5,7 @@ from collections.abc import Callable, Mapping
 from typing import Any
 
 from paraflex.units import ANGLE, PLAIN, Dimension, dimension_text, unit_named
-from .expressions import CONSTANTS, ExpressionError, expressed_in, tree_of
+from .evaluate import CONSTANTS, ExpressionError, expressed_in, quantity_in, tree_of
 
 # Function from a name to its dimension; None where it is unknown, as for the time or a parameter without a unit.
 _Of = Callable[[str], Dimension | None]
@@ -57,6 +57,8 @@ def dimensions_of_parameters(table: Mapping[str, Any]) -> dict[str, Dimension | 
 def _dimension(node: ast.AST, of: _Of) -> Dimension | None:
     match node:
         case ast.Name(id=name):
+            return of(name)
+        case ast.Constant(value=str()) | ast.Attribute() if (name := quantity_in(node)) is not None:
             return of(name)
         case ast.BinOp(op=ast.MatMult(), right=ast.Constant(value=str() as unit)):
             return unit_named(unit).dimension

@@ -119,8 +119,35 @@ def is_constant(text: str) -> bool:
 
 
 def names_in(text: str) -> set[str]:
-    """Return the names in an expression: parameters, functions, time."""
-    return {node.id for node in ast.walk(tree_of(text)) if isinstance(node, ast.Name)}
+    """Return the names in an expression: parameters, functions, time, and quantities of a motion."""
+    return set(_names(tree_of(text)))
+
+
+def _names(node: ast.AST) -> Iterator[str]:
+    name = quantity_in(node)
+    if name is not None:
+        yield name
+        return
+    if isinstance(node, ast.Name):
+        yield node.id
+    for child in ast.iter_child_nodes(node):
+        yield from _names(child)
+
+
+def quantity_in(node: ast.AST) -> str | None:
+    """Return the name of a quantity of a motion, say "stage.T.y", None for another node of a syntax tree.
+
+    Names that are no identifiers are quoted: "'stage-1.T.y'".
+    """
+    match node:
+        case ast.Constant(value=str() as name):
+            return name
+        case ast.Attribute(value=ast.Name(id=name), attr=last):
+            return f"{name}.{last}"
+        case ast.Attribute(value=ast.Attribute() as owner, attr=last):
+            whole = quantity_in(owner)
+            return None if whole is None else f"{whole}.{last}"
+    return None
 
 
 def evaluate_parameters(table: Mapping[str, Any]) -> dict[str, float]:
@@ -258,6 +285,8 @@ def _value(node: ast.AST, value_of: Callable[[str], Any]) -> Any:
             return _float(number)
         case ast.Name(id=name):
             return value_of(name)
+        case ast.Constant(value=str()) | ast.Attribute() if (name := quantity_in(node)) is not None:
+            return value_of(name)
         case ast.BinOp(left=number, op=ast.MatMult()):
             return _value(number, value_of)
         case ast.BinOp(left=left, op=op, right=right) if type(op) in _BINARY:
@@ -271,10 +300,7 @@ def _value(node: ast.AST, value_of: Callable[[str], Any]) -> Any:
             return _call(name, [_value(argument, value_of) for argument in arguments])
     if isinstance(node, ast.BinOp) and isinstance(node.op, ast.BitXor):
         raise ExpressionError('"^" is a power only in units', 'write ** for powers: "x**2"')
-    raise ExpressionError(
-        "only numbers, parameters, + - * / ** and brackets may stand in an expression, and functions like sin(...)",
-        "compute the value elsewhere and write the number",
-    )
+    raise _not_allowed()
 
 
 def _call(name: str, arguments: list[Any]) -> Any:
@@ -301,7 +327,16 @@ def _look_up(name: str, parameters: Mapping[str, float]) -> float:
 
 
 def _unknown(name: str, parameters: Mapping[str, Any]) -> ExpressionError:
+    if not name.isidentifier():
+        return _not_allowed()
     remedy = suggestion(name, parameters)
     if name in UNITS:
         remedy = f'a unit stands behind a number, units with a space between them: "1 {name}", "5 N m"'
     return ExpressionError(f'unknown parameter "{name}"', remedy)
+
+
+def _not_allowed() -> ExpressionError:
+    return ExpressionError(
+        "only numbers, parameters, + - * / ** and brackets may stand in an expression, and functions like sin(...)",
+        "compute the value elsewhere and write the number",
+    )

@@ -1,0 +1,1 @@
+"""Expressions of parameters, units and the time: their values, derivatives and dimensions."""
