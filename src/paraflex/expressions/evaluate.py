@@ -130,7 +130,7 @@ def _names(node: ast.AST) -> Iterator[str]:
         return
     if isinstance(node, ast.Name):
         yield node.id
-    for child in ast.iter_child_nodes(node):
+    for child in ast.iter_child_nodes(node) if not isinstance(getattr(node, "op", None), ast.MatMult) else ():
         yield from _names(child)
 
 
@@ -141,7 +141,7 @@ def quantity_in(node: ast.AST) -> str | None:
     """
     match node:
         case ast.Constant(value=str() as name):
-            return name
+            return name if "." in name else None
         case ast.Attribute(value=ast.Name(id=name), attr=last):
             return f"{name}.{last}"
         case ast.Attribute(value=ast.Attribute() as owner, attr=last):
