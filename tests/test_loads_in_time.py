@@ -439,7 +439,7 @@ def test_what_a_file_has_no_words_for_is_refused(tmp_path):
     mechanism = pendulum(loads=(PointForce("push", PointRef("arm", "B"), differing),))
     with pytest.raises(InputError, match=r"load\.push\.force: a model file cannot express a force whose components"):
         mechanism.save(tmp_path / "no.toml")
-    with pytest.raises(InputError, match=r"load\.push\.force: not a number or a profile in time"):
+    with pytest.raises(InputError, match=r"load\.push\.force: not a number, a profile in time or a law"):
         PointForce("push", PointRef("arm", "B"), ("t", 0.0))
     differing = tuple(TabulatedProfile((0.0, 1.0), (0.0, 2.0), kind) for kind in ("spline", "linear"))
     mechanism = pendulum(loads=(PointForce("push", PointRef("arm", "B"), differing),))
@@ -475,14 +475,21 @@ def study_of(folder, force, flexible=True):
     return load_sensitivities(folder / "study.toml")
 
 
-@pytest.mark.parametrize(("flexible", "follows"), [(True, 20.0), (True, 0.1), (False, 20.0)])
-def test_runs_have_derivatives_by_a_number_in_a_profile_of_a_load(tmp_path, monkeypatch, flexible, follows):
+IN_TIME = 'force = ["a * sin(200 * t)", "-a * t"]'
+BY_LAW = 'force = ["-30 * a * link4.C.vx + sin(A1.angle) * t", "-a * max(400 * (link4.C.y - 0.26), -9)"]'
+
+
+@pytest.mark.parametrize(
+    ("force", "flexible", "follows"),
+    [(IN_TIME, True, 20.0), (IN_TIME, True, 0.1), (IN_TIME, False, 20.0), (BY_LAW, True, 20.0), (BY_LAW, True, 0.1)],
+)
+def test_runs_have_derivatives_by_a_number_in_a_load(tmp_path, monkeypatch, force, flexible, follows):
     """Without flexible bodies the equations of motion are solved at samples within steps, where curves are 2 % off.
 
     So they are with flexible ones in steps that are long beside vibrations, which all are that count as such.
     """
     monkeypatch.setattr("paraflex.integrators.native._FOLLOWS", follows)
-    study = study_of(tmp_path, 'force = ["a * sin(200 * t)", "-a * t"]', flexible)
+    study = study_of(tmp_path, force, flexible)
     setting = study.setting
     task = Task(0, 0, nominal_values(study.setting), "line")
     planned, options = plan_task(setting, task)

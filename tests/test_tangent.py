@@ -23,7 +23,17 @@ from paraflex.kernel.ode import (
 from paraflex.kernel.packed import CONSTRAINT, FRICTION, OMEGA2
 from paraflex.kernel.stage import equations
 from paraflex.kernel.tangent import make_tangent, note_slopes, residual_tangent
-from paraflex.mechanism import AppliedTorque, Geometry, LinearSpring, LumpedMass, PointForce, PointRef, raparm_i
+from paraflex.mechanism import (
+    AppliedTorque,
+    ForceLaw,
+    Geometry,
+    LinearSpring,
+    LumpedMass,
+    PointForce,
+    PointRef,
+    TabulatedProfile,
+    raparm_i,
+)
 from test_axes import make_sliders
 
 TIME, ALPHA, BETA, PART = 0.37, 3.0, 7.0, 1e-7
@@ -49,6 +59,24 @@ def loaded_linkage(geometry):
     )
 
 
+def with_laws(mechanism):
+    """The sliders under forces of everything that laws depend on, and of every operation."""
+    law = ForceLaw
+    table = TabulatedProfile((-3.0, -1.0, 0.2, 1.0, 4.0), (1.0, -2.0, 0.5, 3.0, 1.0))
+    forces = (
+        ("block.S", (law("k * guide.travel**3 - 2 * tanh(guide.rate) * t", {"k": 3.0}), law("sin(O.angle) / 3"))),
+        (
+            "plate.T",
+            (law("exp(-plate.T.x**2) * bob.C.vy", table=table), law("max(rail.travel, -2) * min(rail.rate, 9)")),
+        ),
+        ("bob.C", (law("sqrt(2 + cos(pin.travel)) - log(5 + bead.travel**2)"), law("abs(bead.rate) ** 1.5 + 0.3"))),
+        ("rod.W", (law("atan(trolley.travel + slot.travel) - asin(tanh(ground.G.x - rod.W.y))"), 2.0)),
+    )
+    torque = law("-O.rate * acos(tanh(crank.P.vx)) + 2**sinh(tanh(O.angle)) + cosh(tan(0.2 * sin(crank.M.x)))")
+    loads = [PointForce(f"on_{at[:3]}", PointRef.parse(at), force) for at, force in forces]
+    return replace(mechanism, loads=(*loads, AppliedTorque("turn", PointRef.parse("crank.P"), torque)))
+
+
 def mechanism(name):
     kind, _, geometry = name.partition(" ")
     geometry = Geometry(geometry or "linear")
@@ -67,12 +95,15 @@ def mechanism(name):
         return replace(make_geared_linkage().with_geometry(geometry), gravity=(0.3, -9.81))
     if kind == "sliders":
         return make_sliders(geometry)
+    if kind == "laws":
+        return with_laws(make_sliders(geometry))
     return load(kind).mechanism
 
 
 NAMES = [
     "raparm linear", "raparm second-order", "linkage linear", "linkage second-order", "gears linear",
-    "gears second-order", "sliders linear", "sliders second-order",
+    "gears second-order", "sliders linear", "sliders second-order", "laws linear",
+    "laws second-order",
     "lumps second-order", "slider_crank_flexible", "3prr", "andrews",
 ]  # fmt: skip
 

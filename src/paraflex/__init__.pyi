@@ -6,6 +6,7 @@ from .mechanism import (
     Mechanism as Mechanism,
     RigidBody as RigidBody,
     FlexibleBeam as FlexibleBeam,
+    ForceLaw as ForceLaw,
     AssumedModesBeam as AssumedModesBeam,
     ModalBody as ModalBody,
     ModalPoint as ModalPoint,

@@ -19,7 +19,7 @@ from paraflex.files import Model
 from paraflex.mechanism import Mechanism
 from paraflex.mechanism.masses import with_any_masses
 from paraflex.plots.themes import theme
-from paraflex.results.acting import acting_load, drive_speed
+from paraflex.results.acting import drive_speed
 from paraflex.writing import portable_name, whole_file
 from .commands.models import DrawRequest
 from .replacing import refuse_existing
@@ -124,9 +124,8 @@ def _print_result(console: PlainConsole, model: Model, shown: Posed, request: Dr
     console.print(_joints(mechanism, shown))
     console.print_lines(f"bodies: {listed([body.name for body in mechanism.bodies], _LISTED)}")
     console.print_lines(*_drives(mechanism, shown))
-    for load in mechanism.loads[:_LISTED]:
-        size = acting_load(load, shown.duration).size
-        console.print_lines(f"load {load.name}: {load.kind} at {load.point}, {size}")
+    for one in shown.acting[:_LISTED]:
+        console.print_lines(f"load {one.load.name}: {one.load.kind} at {one.load.point}, {one.size}")
     if mechanism.sensors:
         sensors = [f"{one.name} ({one.kind})" for one in mechanism.sensors]
         console.print_lines(f"sensors: {listed(sensors, _LISTED)}")

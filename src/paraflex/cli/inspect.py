@@ -235,7 +235,10 @@ def _actuator(mechanism: Mechanism, actuator: Actuator) -> str:
 
 def _load(load: PointForce | AppliedTorque) -> str:
     """Return name, kind, components and place of a load; a component that depends on time reads "in time"."""
-    parts = ["in time" if isinstance(one, TimeProfile) else number(one) for one in load.components]
+    parts = [
+        number(one) if isinstance(one, int | float) else "in time" if isinstance(one, TimeProfile) else str(one)
+        for one in load.components
+    ]
     size = f"({', '.join(parts)})" if len(parts) > 1 else parts[0]
     return f"{load.name}: {load.kind} {size} {load.unit} at {load.point}"
 

@@ -7,7 +7,9 @@ from typing import Any
 import numpy as np
 
 from paraflex.arrays import Array, Indices, Records
+from paraflex.expressions.program import OPERATIONS, TIME
 from paraflex.fem import MassPoints
+from paraflex.kernel import packed as codes
 from paraflex.kernel.packed import (
     ANGLE,
     AXIS,
@@ -16,26 +18,37 @@ from paraflex.kernel.packed import (
     BODY,
     FULL,
     GAUSS,
+    LAW,
     LINE,
     LOAD,
     MARKER,
     MOTOR_SIDE,
+    OF_ANGLE,
+    OF_AXIS,
+    OF_COORDINATE,
+    OPERATION,
     POINT,
     PORT,
+    QUANTITY_RECORD,
     ROW,
+    TABLE,
     TRACK,
     PackedSystem,
 )
 from paraflex.kernel.sums import FIRST_MARKER
 from paraflex.kernel.vectors import LANES, padded
-from paraflex.mechanism import Joint, Mechanism, PointRef, TimeProfile
+from paraflex.mechanism import ForceLaw, Joint, Mechanism, MotionQuantity, PointRef, TimeProfile
 from .constraints import Constraint, Term, coordinate
 from .coordinates import BodyCoordinates, Marker, PlacedBodies, transverse_pieces
 from .inputs import inputs_of
 from .scale import mechanism_size
+from .signals import InputSignals, table_curve
 
 # Displacements of mass points in one direction below this part of those in the other are rounding.
 _ROUNDING = 1e-8
+# Codes of the operations of laws by their names in expressions.
+_SIGNS = {"+": "ADD", "-": "SUBTRACT", "*": "MULTIPLY", "/": "DIVIDE", "**": "POWER", "negative": "NEGATE"}
+_CODES = {name: getattr(codes, _SIGNS.get(name, name.upper())) for name in OPERATIONS}
 # Fields of a line that a spring between points defines.
 _OF_SPRINGS = ("stiffness", "length", "damping")
 
@@ -52,7 +65,7 @@ def pack_system(placed: PlacedBodies, constraints: list[Constraint]) -> tuple[Pa
         packer.end(spring.a, "a") | packer.end(spring.b, "b") | {name: getattr(spring, name) for name in _OF_SPRINGS}
         for spring in mechanism.linear_springs
     ]
-    loads = _load_records(mechanism, packer)
+    loads, laws, curves = _load_records(mechanism, packer)
     markers, columns = packer.markers, _columns(bodies, packer.markers)
     tracks, breaks, coefficients = _tracks([bodies[i] for i in packer.tracks])
     kinds = [_kinds(body) for body in bodies]
@@ -67,6 +80,12 @@ def pack_system(placed: PlacedBodies, constraints: list[Constraint]) -> tuple[Pa
         ports=_port_records(packer.ports),
         motor_sides=records(MOTOR_SIDE, [side for group in packer.motor_sides for side in group]),
         loads=records(LOAD, loads),
+        laws=records(LAW, laws),
+        operations=records(OPERATION, packer.operations),
+        quantities=records(QUANTITY_RECORD, packer.quantities),
+        curve_start=np.cumsum([0, *(curve.breaks.size for curve in curves)]),
+        curve_breaks=np.concatenate([np.zeros(0), *(curve.breaks for curve in curves)]),
+        curve_coefficients=np.vstack([np.zeros((0, 6)), *(curve.coefficients for curve in curves)]),
         lines=records(LINE, lines),
         axes=records(AXIS_RECORD, packer.axes),
         tracks=records(TRACK, tracks),
@@ -108,6 +127,8 @@ class _Packer:
         self.ports: list[list[dict]] = [[] for _ in placed.bodies]
         self.motor_sides: list[list[dict]] = [[] for _ in placed.bodies]
         self.axes: list[dict] = []
+        self.operations: list[dict] = []
+        self.quantities: list[dict] = []
         self.tracks: list[int] = []
         self.rows: list[dict] = []
         self.labels: list[str] = []
@@ -158,18 +179,45 @@ class _Packer:
             port = {"marker": marker, "kind": term.kind, "row": row, "rows": rows, "parts": parts, "axis": axis}
             self.ports[self.index[ref.body]].append(port | {"weight": weight})
 
-    def add_axis(self, term: Term, row: int = -1, signal: int = -1) -> int:
-        ends, carrier, track = self.end(term.a, "a") | self.end(term.b, "b"), term.carrier, -1
+    def ends(self, term: Term) -> dict[str, float]:
+        """Return both ends of a term, and the angle of its axis."""
+        ends, carrier = self.end(term.a, "a") | self.end(term.b, "b"), term.carrier
         if carrier in ("frame", "track"):
             # The frame has no slope of its own, and a track is measured from the frame's origin.
             fixed = self.markers[int(ends["a"])].on_frame
             self.markers[int(ends["a"])] = fixed if carrier == "frame" else replace(fixed, x0=np.zeros(2))
-        if carrier == "track":
+        return ends | {"angle": term.direction, "between": int(carrier == "nothing")}
+
+    def add_axis(self, term: Term, row: int = -1, signal: int = -1) -> int:
+        ends, track = self.ends(term), -1
+        if term.carrier == "track":
             self.tracks.append(self.index[term.a.body])
             track = len(self.tracks) - 1
-        record = {"angle": term.direction, "row": row, "weight": term.weight, "signal": signal, "track": track}
-        self.axes.append(ends | record | {"between": int(carrier == "nothing")})
+        self.axes.append(ends | {"row": row, "weight": term.weight, "signal": signal, "track": track})
         return len(self.axes) - 1
+
+    def add_law(self, law: ForceLaw, clock: int, curve: int) -> dict[str, int]:
+        """Add the operations of a law and return its record; `clock` is the signal of the time, `curve` its table."""
+        first = len(self.operations)
+        for each in law.operations:
+            a = each.a
+            if each.quantity:
+                a = self.add_quantity(law.quantities[each.quantity])
+            record = {"code": _CODES[each.name], "a": clock if each.name == TIME else a, "b": each.b}
+            self.operations.append(record | {"number": each.number})
+        if law.table is not None:
+            self.operations.append({"code": TABLE, "a": len(law.operations) - 1, "b": curve})
+        return {"first": first, "end": len(self.operations)}
+
+    def add_quantity(self, quantity: MotionQuantity) -> int:
+        if quantity.point is not None:
+            ends, kind = {"a": -1} | self.end(quantity.point, "b"), OF_COORDINATE
+        else:
+            term = coordinate(self.placed.mechanism.joint(quantity.joint))
+            ends, kind = self.ends(term), OF_AXIS if term.kind == AXIS else OF_ANGLE
+        axis, rate = int(quantity.word.endswith("y")), int(quantity.word in ("rate", "vx", "vy"))
+        self.quantities.append(ends | {"kind": kind, "axis": axis, "rate": rate})
+        return len(self.quantities) - 1
 
     def add_motor(self, joint: Joint, signal: int) -> None:
         if joint.slides:
@@ -192,20 +240,29 @@ def _tracks(bodies: list[BodyCoordinates]) -> tuple[list[dict], Array, Array]:
     return records, breaks, coefficients
 
 
-def _load_records(mechanism: Mechanism, packer: _Packer) -> list[dict[str, float]]:
-    """Return records of loads: constant components as numbers, profiles in time as signal numbers."""
-    signals, records = iter(inputs_of(mechanism).loads), []
+def _load_records(
+    mechanism: Mechanism, packer: _Packer
+) -> tuple[list[dict[str, float]], list[dict[str, int]], list[InputSignals]]:
+    """Return records of loads, their laws over the motion, and the tables of these.
+
+    Constant components are numbers, profiles in time the numbers of signals, laws -2 less their numbers.
+    """
+    signals, found, laws, curves = iter(inputs_of(mechanism).loads), [], list[dict[str, int]](), list[InputSignals]()
     for load in mechanism.loads:
         record: dict[str, float] = dict.fromkeys(("x_signal", "y_signal", "torque_signal"), -1)
         record["marker"] = packer.add_marker(load.point)
         names = (("fx", "x_signal"), ("fy", "y_signal")) if load.kind == "force" else (("torque", "torque_signal"),)
         for (number, signal), given in zip(names, load.components, strict=True):
-            if isinstance(given, TimeProfile):
+            if isinstance(given, ForceLaw):
+                record[signal] = -2 - len(laws)
+                laws.append(packer.add_law(given, next(signals) if given.in_time else -1, len(curves)))
+                curves += [] if given.table is None else [table_curve(given.table)]
+            elif isinstance(given, TimeProfile):
                 record[signal] = next(signals)
             else:
                 record[number] = given
-        records.append(record)
-    return records
+        found.append(record)
+    return found, laws, curves
 
 
 def _modal_rows(body: BodyCoordinates) -> Array:

@@ -171,6 +171,22 @@ def _refined(place: str, profile: TimeProfile, t: Array, left: float) -> InputSi
     )  # fmt: skip
 
 
+def table_curve(table: TabulatedProfile) -> InputSignals:
+    """Return the pieces of a table over another quantity than time, one more before it and after it with its ends.
+
+    There is a piece for every break, the first before the table.
+    """
+    t, values = np.array(table.times), np.array(table.values)
+    inner = np.zeros((t.size - 1, _DEGREE + 1), dtype=np.result_type(t, values))
+    if table.linear:
+        inner[:, 0], inner[:, 1] = values[:-1], np.diff(values) / np.diff(t)
+    else:
+        inner = piecewise_quintic(t, *table.evaluate(t)).coefficients
+    ends = np.zeros((2, _DEGREE + 1), dtype=inner.dtype)
+    ends[:, 0] = values[[0, -1]]
+    return InputSignals(np.array([t[0] - (t[-1] - t[0]), *t]), np.vstack([ends[:1], inner, ends[1:]]))
+
+
 def still_signals(mechanism: Mechanism, end: float) -> tuple[Signals, list[float]]:
     """Return the signals of `pack_signals` without motor torques."""
     return pack_signals(mechanism, _no_torques(mechanism, end), end)

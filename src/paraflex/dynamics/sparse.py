@@ -170,10 +170,14 @@ def neighbours(system: System, more: Iterable[Sequence[int]] = ()) -> list[set[i
 
 
 def bodies_acted_on(system: System) -> list[set[int]]:
-    """Return for each body the bodies on which its forces act: itself, and those tied to it by rows or springs."""
-    index = system.index
-    ends = [(spring.a, spring.b) for spring in system.mechanism.linear_springs]
-    return neighbours(system, [[index[ref.body] for ref in pair if not ref.on_ground] for pair in ends])
+    """Return for each body the bodies on which its forces act, and those that forces on it depend on.
+
+    These are itself, those tied to it by rows or springs, and those of the laws of loads.
+    """
+    index, mechanism = system.index, system.mechanism
+    groups = [(spring.a, spring.b) for spring in mechanism.linear_springs]
+    groups += [(load.point, *mechanism.points_of(law)) for load in mechanism.loads for law in load.laws]
+    return neighbours(system, [[index[ref.body] for ref in group if not ref.on_ground] for group in groups])
 
 
 def apart_colours(tied: list[set[int]]) -> Indices:

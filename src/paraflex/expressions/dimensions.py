@@ -2,13 +2,18 @@
 
 import ast
 from collections.abc import Callable, Mapping
+from functools import reduce
 from typing import Any
 
-from paraflex.units import ANGLE, PLAIN, Dimension, dimension_text, unit_named
-from .evaluate import CONSTANTS, ExpressionError, expressed_in, quantity_in, tree_of
+from paraflex.units import ANGLE, PLAIN, Dimension, dimension_text, quantities_in, unit_named
+from .evaluate import CONSTANTS, ExpressionError, expressed_in, names_in, quantity_in, tree_of
 
 # Function from a name to its dimension; None where it is unknown, as for the time or a parameter without a unit.
 _Of = Callable[[str], Dimension | None]
+
+
+# Units of quantities of a motion by the last part of their names.
+UNITS_OF_QUANTITIES = {"angle": "rad", "travel": "m", "x": "m", "y": "m", "vx": "m/s", "vy": "m/s"}
 
 
 def dimension_of(text: str, parameters: Mapping[str, Dimension | None]) -> Dimension | None:
@@ -26,7 +31,15 @@ def dimension_of(text: str, parameters: Mapping[str, Dimension | None]) -> Dimen
     ExpressionError
         Sum of quantities of different dimensions, or function of a quantity that is not an angle.
     """
-    return _dimension(tree_of(text), lambda name: PLAIN if name in CONSTANTS else parameters.get(name))
+    names = names_in(text)
+    if any("." in name for name in names) and not quantities_in(text) and not any(map(parameters.get, names)):
+        return None  # all its numbers are in SI units
+    return _dimension(tree_of(text), lambda name: PLAIN if name in CONSTANTS else _named(name, parameters))
+
+
+def _named(name: str, parameters: Mapping[str, Dimension | None]) -> Dimension | None:
+    unit = UNITS_OF_QUANTITIES.get(name.rpartition(".")[2]) if "." in name else None
+    return parameters.get(name) if unit is None else unit_named(unit).dimension
 
 
 def dimensions_of_parameters(table: Mapping[str, Any]) -> dict[str, Dimension | None]:
@@ -72,6 +85,8 @@ def _dimension(node: ast.AST, of: _Of) -> Dimension | None:
             return _power(_dimension(base, of), exponent)
         case ast.UnaryOp(operand=operand):
             return _dimension(operand, of)
+        case ast.Call(func=ast.Name(id="abs" | "min" | "max"), args=arguments) if arguments:
+            return reduce(_of_sum, [_dimension(argument, of) for argument in arguments])
         case ast.Call(func=ast.Name(id=name), args=[argument]):
             return _of_function(name, _dimension(argument, of))
     return PLAIN

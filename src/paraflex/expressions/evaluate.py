@@ -30,7 +30,7 @@ _BINARY: dict[type, Callable[[Any, Any], Any]] = {
 }
 _UNARY: dict[type, Callable[[Any], Any]] = {ast.USub: operator.neg, ast.UAdd: operator.pos}
 # Functions that are not smooth: users may expect them, but motions must have derivatives.
-_WITH_KINKS = {"abs", "sign", "min", "max", "floor", "ceil", "round", "step", "heaviside", "mod"}
+WITH_KINKS = {"abs", "sign", "min", "max", "floor", "ceil", "round", "step", "heaviside", "mod"}
 
 
 class ExpressionError(ValueError):
@@ -68,7 +68,7 @@ def evaluate(text: str, parameters: Mapping[str, float]) -> float:
     ExpressionError
         Syntax error, element that is not allowed, unknown parameter, or value that is not finite.
     """
-    _refuse_ambiguous(text, parameters)
+    refuse_ambiguous(text, parameters)
     return _finite(_arithmetic(text, lambda name: _look_up(name, parameters)))
 
 
@@ -164,7 +164,7 @@ def evaluate_parameters(table: Mapping[str, Any]) -> dict[str, float]:
         if name in values or name in CONSTANTS:
             return values.get(name, CONSTANTS.get(name, 0.0))
         if name not in table:
-            raise _unknown(name, table)
+            raise unknown_name(name, table)
         if name in open_names:
             circle = " -> ".join([*open_names[open_names.index(name) :], name])
             raise ExpressionError(f"a cycle of parameters, {circle}", "give one of them a number")
@@ -173,7 +173,7 @@ def evaluate_parameters(table: Mapping[str, Any]) -> dict[str, float]:
             raise ExpressionError("a chain of too many parameters", remedy)
         entry = table[name]
         if isinstance(entry, str):
-            _refuse_ambiguous(entry, table)
+            refuse_ambiguous(entry, table)
             values[name] = _finite(_arithmetic(entry, lambda other: value_of(other, (*open_names, name))))
         else:
             values[name] = _float(entry)
@@ -200,7 +200,7 @@ def _in_time(text: str, parameters: Mapping[str, float], t: Array) -> Any:
             f'"{TIME_NAME}" is the time in this expression', f'give the parameter "{TIME_NAME}" another name'
         )
 
-    _refuse_ambiguous(text, parameters)
+    refuse_ambiguous(text, parameters)
 
     def value_of(name: str) -> Any:
         return Jet.time(t) if name == TIME_NAME else _look_up(name, parameters)
@@ -259,7 +259,8 @@ def _without_units(text: str) -> str:
     return out + text[end:]
 
 
-def _refuse_ambiguous(text: str, parameters: Mapping[str, Any]) -> None:
+def refuse_ambiguous(text: str, parameters: Mapping[str, Any]) -> None:
+    """Raise an ExpressionError if a unit of an expression is divided by what is a unit and a parameter."""
     for found in quantities_in(text) if parameters else ():
         for name in sorted(divisors_in(found.unit) & parameters.keys()):
             written = text[found.start : found.end]
@@ -298,22 +299,25 @@ def _value(node: ast.AST, value_of: Callable[[str], Any]) -> Any:
             return _UNARY[type(op)](_value(operand, value_of))
         case ast.Call(func=ast.Name(id=name), args=arguments, keywords=[]):
             return _call(name, [_value(argument, value_of) for argument in arguments])
-    if isinstance(node, ast.BinOp) and isinstance(node.op, ast.BitXor):
-        raise ExpressionError('"^" is a power only in units', 'write ** for powers: "x**2"')
-    raise _not_allowed()
+    raise not_allowed(node)
 
 
 def _call(name: str, arguments: list[Any]) -> Any:
-    if name in _WITH_KINKS:
-        raise ExpressionError(f'the function "{name}" has no derivative everywhere', "write a motion in pieces instead")
-    if name not in FUNCTIONS:
-        raise ExpressionError(f'unknown function "{name}"', suggestion(name, FUNCTIONS))
-    if len(arguments) != 1:
-        raise ExpressionError(f"{name} takes one argument, not {len(arguments)}", f"write {name}(...)")
+    allowed_call(name, len(arguments))
     if isinstance(arguments[0], Jet):
         return FUNCTIONS[name](arguments[0])
     with np.errstate(all="ignore"):
         return float(FUNCTIONS[name](Jet.constant(arguments[0], np.zeros(1))).value[0])
+
+
+def allowed_call(name: str, arguments: int) -> None:
+    """Raise an ExpressionError unless a name is that of a smooth function and it has one argument."""
+    if name in WITH_KINKS:
+        raise ExpressionError(f'the function "{name}" has no derivative everywhere', "write a motion in pieces instead")
+    if name not in FUNCTIONS:
+        raise ExpressionError(f'unknown function "{name}"', suggestion(name, FUNCTIONS))
+    if arguments != 1:
+        raise ExpressionError(f"{name} takes one argument, not {arguments}", f"write {name}(...)")
 
 
 def _look_up(name: str, parameters: Mapping[str, float]) -> float:
@@ -321,21 +325,25 @@ def _look_up(name: str, parameters: Mapping[str, float]) -> float:
         return parameters[name]
     if name in CONSTANTS:
         return CONSTANTS[name]
+    raise unknown_name(name, parameters)
+
+
+def unknown_name(name: str, parameters: Mapping[str, Any]) -> ExpressionError:
+    """Return the error for a name that is none of the parameters and constants."""
     if name in FUNCTIONS:
-        raise ExpressionError(f"{name} is a function", f"write {name}(...)")
-    raise _unknown(name, parameters)
-
-
-def _unknown(name: str, parameters: Mapping[str, Any]) -> ExpressionError:
+        return ExpressionError(f"{name} is a function", f"write {name}(...)")
     if not name.isidentifier():
-        return _not_allowed()
+        return not_allowed()
     remedy = suggestion(name, parameters)
     if name in UNITS:
         remedy = f'a unit stands behind a number, units with a space between them: "1 {name}", "5 N m"'
     return ExpressionError(f'unknown parameter "{name}"', remedy)
 
 
-def _not_allowed() -> ExpressionError:
+def not_allowed(node: ast.AST | None = None) -> ExpressionError:
+    """Return the error for what may not stand in an expression."""
+    if isinstance(node, ast.BinOp) and isinstance(node.op, ast.BitXor):
+        return ExpressionError('"^" is a power only in units', 'write ** for powers: "x**2"')
     return ExpressionError(
         "only numbers, parameters, + - * / ** and brackets may stand in an expression, and functions like sin(...)",
         "compute the value elsewhere and write the number",

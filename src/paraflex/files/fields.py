@@ -81,6 +81,8 @@ def units_at(schema: type[BaseModel], data: Mapping[str, Any], place: Place) -> 
     found = field_at(schema, data, place)
     if place[0] in _OF_ANY_UNIT or "unit of" in found.description:
         return None
+    if "table" in place and place[-1] == 0 and value_at(data, (*place[:2], "over")) is not None:
+        return None
     units = _units_in(found.description, _row(data, place), place[-1])
     if place[0] == "gear" and place[-1] == "ratio":
         return _ratio_units(data, place)

@@ -9,8 +9,8 @@ import numpy as np
 from paraflex.arrays import Array
 from paraflex.errors import InputError, renamed
 from paraflex.expressions.evaluate import check_in_time, evaluate, evaluate_in_time, expressed_in, is_constant, names_in
-from paraflex.mechanism import ConstantSpeed, PiecewiseProfile, SpeedProfile, TabulatedProfile, TimeProfile
-from paraflex.mechanism.loads import InTime
+from paraflex.mechanism import ConstantSpeed, ForceLaw, PiecewiseProfile, SpeedProfile, TabulatedProfile, TimeProfile
+from paraflex.mechanism.loads import InMotion
 from paraflex.mechanism.profiles import Interpolation, Values
 from .schema import PrescribedTable
 
@@ -171,7 +171,7 @@ def profile_table(profile: TimeProfile, quantity: str) -> dict[str, Any]:
 
 def read_components(
     entry: Any, quantity: str, parameters: Mapping[str, float], duration: float | None
-) -> tuple[InTime, ...]:
+) -> tuple[InMotion, ...]:
     """Read the two components of a "force", or the one of a "torque", and check profiles as `read_profile` does.
 
     Parameters
@@ -202,15 +202,26 @@ def read_components(
         raise InputError(
             "is for tables only", field="interpolation", value=entry.interpolation, remedy="drop it, or give a table"
         )
+    over = getattr(entry, "over", None)
+    if over is not None and entry.table is None:
+        raise InputError(
+            "is for tables only", field="over", value=over, remedy=f"write the {quantity} as an expression"
+        )
     components = tuple(map(_number_if_constant, _profiles(entry, parameters)))
+    if over is not None:
+        # A column of one number is no law.
+        laws = (ForceLaw(over, parameters, table=each) if isinstance(each, TabulatedProfile) else each
+                for each in components)  # fmt: skip
+        with renamed("over", only="force"):
+            return tuple(laws)
     for profile in components:
         if isinstance(profile, TimeProfile):
             _try(profile, duration)
     return components
 
 
-def _profiles(entry: Any, parameters: Mapping[str, float]) -> list[TimeProfile]:
-    """Read the profile of each component of a quantity, from rows, pieces, or numbers and expressions."""
+def _profiles(entry: Any, parameters: Mapping[str, float]) -> list[Any]:
+    """Read the profile or law of each component of a quantity, from rows, pieces, or numbers and expressions."""
     if entry.table is not None:
         times, *columns = zip(*entry.table, strict=True) if entry.table else ((), ())
         kind = getattr(entry, "interpolation", None) or Interpolation.SPLINE
@@ -222,7 +233,7 @@ def _profiles(entry: Any, parameters: Mapping[str, float]) -> list[TimeProfile]:
     return _expressions(entry, parameters)
 
 
-def _expressions(table: Any, parameters: Mapping[str, float], place: str = "") -> list[TimeProfile]:
+def _expressions(table: Any, parameters: Mapping[str, float], place: str = "") -> list[Any]:
     """Read the numbers and expressions of the one quantity of a table or piece; `place` is that of a piece."""
     given = _quantities(table)
     if len(given) != 1:
@@ -237,15 +248,17 @@ def _expressions(table: Any, parameters: Mapping[str, float], place: str = "") -
     return [_expression(value, parameters, field)]
 
 
-def _expression(given: float | str, parameters: Mapping[str, float], field: str) -> TimeProfile:
-    """Read a number or an expression; one that does not contain the time is a constant."""
+def _expression(given: float | str, parameters: Mapping[str, float], field: str) -> Any:
+    """Read a number or an expression, a law if it has quantities of the motion, a constant if it has no time."""
+    if isinstance(given, str) and any("." in name for name in names_in(given)):
+        return ForceLaw(given, parameters, field=field)
     if isinstance(given, str) and not is_constant(given):
         return ExpressionProfile(given, parameters, field)
     with expressed_in(field, given):
         return ConstantSpeed(evaluate(given, parameters) if isinstance(given, str) else given, 0.0)
 
 
-def _number_if_constant(profile: TimeProfile) -> InTime:
+def _number_if_constant(profile: Any) -> InMotion:
     """Return a number for a constant profile, and for pieces or rows of one and the same number."""
     pieces = profile.pieces if isinstance(profile, PiecewiseProfile) else (profile,)
     if isinstance(profile, TabulatedProfile):
@@ -257,7 +270,7 @@ def _number_if_constant(profile: TimeProfile) -> InTime:
     return values[0] if len(set(values)) == 1 else profile
 
 
-def components_table(components: Sequence[InTime], quantity: str) -> dict[str, Any]:
+def components_table(components: Sequence[InMotion], quantity: str) -> dict[str, Any]:
     """Build the fields of a table for the components of a "force" or a "torque".
 
     Raises
@@ -269,6 +282,12 @@ def components_table(components: Sequence[InTime], quantity: str) -> dict[str, A
     def in_file(values: Sequence[Any]) -> Any:
         return list(values) if quantity == "force" else values[0]
 
+    laws = [each for each in components if isinstance(each, ForceLaw) and each.table is not None]
+    if laws:
+        rest = [each.table if isinstance(each, ForceLaw) and each.text == laws[0].text else each for each in components]
+        if any(isinstance(each, ForceLaw) for each in rest):
+            raise _unlike(components)
+        return {"over": laws[0].text} | components_table([each for each in rest if each is not None], quantity)
     tables = [profile for profile in components if isinstance(profile, TabulatedProfile)]
     pieces = [profile for profile in components if isinstance(profile, PiecewiseProfile)]
     if tables:
@@ -299,7 +318,7 @@ def components_table(components: Sequence[InTime], quantity: str) -> dict[str, A
     }
 
 
-def profile_parameters(profiles: Iterable[tuple[str, TimeProfile]]) -> dict[str, float]:
+def profile_parameters(profiles: Iterable[tuple[str, TimeProfile | ForceLaw]]) -> dict[str, float]:
     """Collect the parameters of profiles, each given with its field in a file.
 
     Raises
@@ -311,7 +330,7 @@ def profile_parameters(profiles: Iterable[tuple[str, TimeProfile]]) -> dict[str,
     for place, whole in profiles:
         whole = whole.speed if isinstance(whole, SpeedProfile) else whole
         for profile in whole.pieces if isinstance(whole, PiecewiseProfile) else (whole,):
-            for name, value in profile.parameters.items() if isinstance(profile, ExpressionProfile) else ():
+            for name, value in profile.parameters.items() if isinstance(profile, ExpressionProfile | ForceLaw) else ():
                 if found.setdefault(name, value) != value:
                     raise InputError(
                         f'a file has one value of the parameter "{name}", but profiles have {found[name]!r}, {value!r}',
@@ -320,8 +339,10 @@ def profile_parameters(profiles: Iterable[tuple[str, TimeProfile]]) -> dict[str,
     return found
 
 
-def _piece(profile: InTime) -> float | str:
-    if not isinstance(profile, TimeProfile):
+def _piece(profile: InMotion) -> float | str:
+    if isinstance(profile, ForceLaw) and profile.table is None:
+        return profile.text
+    if isinstance(profile, int | float):
         return float(profile)
     if isinstance(profile, ExpressionProfile):
         return profile.text
@@ -332,14 +353,14 @@ def _piece(profile: InTime) -> float | str:
     raise _inexpressible_profile(profile)
 
 
-def _inexpressible_profile(profile: TimeProfile) -> InputError:
+def _inexpressible_profile(profile: TimeProfile | ForceLaw) -> InputError:
     return InputError(
         "a model file cannot express this profile", field="profile", value=type(profile).__name__,
         remedy="give a ConstantSpeed, ExpressionProfile, PiecewiseProfile of these, or TabulatedProfile of its values",
     )  # fmt: skip
 
 
-def _unlike(components: Sequence[InTime]) -> InputError:
+def _unlike(components: Sequence[InMotion]) -> InputError:
     return InputError(
         "a model file cannot express a force whose components change at different times",
         field="force", value=", ".join(type(profile).__name__ for profile in components),

@@ -32,6 +32,7 @@ from paraflex.control.laws.kinds import LAWS
 from paraflex.control.shaping.shapers import Shaper
 from paraflex.equilibria.conditions import StaticsDefaults
 from paraflex.expressions.evaluate import CONSTANTS, ExpressionError, check_in_time, evaluate
+from paraflex.expressions.program import operations_of
 from paraflex.limits import LARGEST, TEXT_LETTERS, WHOLE
 from paraflex.mechanism import (
     JOINT_KINDS,
@@ -53,7 +54,7 @@ from paraflex.mechanism import (
     groups_of,
 )
 from paraflex.mechanism.bodies import BODY_KINDS
-from paraflex.mechanism.loads import InTime
+from paraflex.mechanism.loads import InMotion, InTime
 from paraflex.mechanism.quantities import joint_pair
 from paraflex.mechanism.sections import SHAPES
 from paraflex.paths import Circle, Line, Path, PointPath, Polygon, SequencePath, TabulatedPath
@@ -73,10 +74,19 @@ def _number(value: Any, info: ValidationInfo) -> Any:
 
 def _function(value: Any, info: ValidationInfo) -> Any:
     """Return a finite number as a float, or an expression of the time t after a check of its syntax."""
+    return _checked_function(value, lambda text: check_in_time(text, _parameters(info)))
+
+
+def _law(value: Any, info: ValidationInfo) -> Any:
+    """Return a number or an expression as `_function`, which may contain quantities of the motion as well."""
+    return _checked_function(value, lambda text: operations_of(text, _parameters(info)))
+
+
+def _checked_function(value: Any, check: Callable[[str], Any]) -> Any:
     example = 'write "0.2 * sin(3 * t)"'
     if isinstance(value, str):
         try:
-            check_in_time(value, _parameters(info))
+            check(value)
         except ExpressionError as error:
             raise _refused(error.problem, error.remedy) from None
         return value
@@ -129,6 +139,8 @@ Number = Annotated[
 NumberOfFields = Annotated[Number, WrapValidator(_with_text)]
 # A number, or an expression of parameters and the time t in quotes.
 FunctionOfTime = Annotated[Any, BeforeValidator(_function, json_schema_input_type=float | str)]
+# The same, and joints and points: "-k * slider.travel".
+FunctionOfMotion = Annotated[Any, BeforeValidator(_law, json_schema_input_type=float | str)]
 Count = Annotated[int, Field(strict=True, ge=-WHOLE, le=WHOLE)]
 Text = Annotated[str, Field(strict=True, max_length=TEXT_LETTERS)]
 Pair = Annotated[list[Number], Field(min_length=2, max_length=2)]
@@ -159,6 +171,7 @@ _UNTIL = _optional("the time in s at which the next piece takes over")
 _INTERPOLATION = _optional('the interpolation of a table: "spline", smooth, by default, or "linear"')
 InterpolationName = Literal["spline", "linear"]
 _PAIR_IN_TIME = Annotated[list[FunctionOfTime], Field(min_length=2, max_length=2)]
+_PAIR_OF_MOTION = Annotated[list[FunctionOfMotion], Field(min_length=2, max_length=2)]
 
 
 class ForcePiece(_Table):
@@ -178,10 +191,14 @@ class TorquePiece(_Table):
 # Schema of one component, or of two, that may be time profiles: a function, pieces, rows of a table, and the columns.
 _IN_TIME: dict[Any, tuple[Any, Any, Any, str]] = {
     InTime: (FunctionOfTime, TorquePiece, Rows, "[t, torque] in s and N m, or the name of a file with two"),
-    tuple[InTime, InTime]: (
-        _PAIR_IN_TIME, ForcePiece, ForceRows, "[t, x, y] in s, N and N, or the name of a file with three"
+    InMotion: (FunctionOfMotion, TorquePiece, Rows, "[t, torque] in s and N m, or the name of a file with two"),
+    tuple[InMotion, InMotion]: (
+        _PAIR_OF_MOTION, ForcePiece, ForceRows, "[t, x, y] in s, N and N, or the name of a file with three"
     ),
 }  # fmt: skip
+_OVER = _optional(
+    "the quantity in place of the time t in a table, an expression of joints and points such as slider.travel"
+)
 
 
 def _in_time(hint: Any, name: str, description: str) -> dict[str, Any]:
@@ -189,7 +206,8 @@ def _in_time(hint: Any, name: str, description: str) -> dict[str, Any]:
     written, piece, rows, columns = _IN_TIME[hint]
     pieces: Any = Annotated[list[piece], Field(min_length=1)]
     example = f"a list of {{ until = s, {name} = ... }}, the last without until"
-    return {
+    over: dict[str, Any] = {} if hint is InTime else {"over": (_written(str | None), _OVER)}
+    return over | {
         name: (written | None, _optional(description)),
         "pieces": (pieces | None, _optional(example)),
         "table": (rows | None, _optional(f"a list of {columns} such columns")),

@@ -15,6 +15,7 @@ from paraflex.mechanism import (
     AssumedModesBeam,
     Body,
     FlexibleBeam,
+    ForceLaw,
     Mechanism,
     ModalBody,
     PointForce,
@@ -123,12 +124,12 @@ def _member(member: Any) -> dict[str, Any]:
     return pairs | changed_fields(member, "name", *(name for names in together.values() for name in names))
 
 
-def _profiles(model: Any) -> Iterator[tuple[str, TimeProfile]]:
-    """Yield the time profiles of a model, each with its field in a file."""
+def _profiles(model: Any) -> Iterator[tuple[str, TimeProfile | ForceLaw]]:
+    """Yield the time profiles and laws of a model, each with its field in a file."""
     torques = model.study.torques
     yield from ((f"prescribed.{one.name}.profile", one.profile) for one in model.mechanism.prescribed)
     yield from (
-        (f"load.{load.name}.{load.kind}", profile) for load in model.mechanism.loads for profile in load.profiles
+        (f"load.{one.name}.{one.kind}", each) for one in model.mechanism.loads for each in (*one.profiles, *one.laws)
     )
     yield from (
         (f"study.torques.{name}", profile) for name, profile in torques.items() if isinstance(profile, TimeProfile)

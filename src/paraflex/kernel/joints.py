@@ -222,26 +222,6 @@ def modal_damping_power(system, v):
 
 
 @inlined
-def load_at(load, torques):
-    """Return force and torque of a load: (fx, fy, torque)."""
-    fx = load.fx if load.x_signal < 0 else torques[load.x_signal]
-    fy = load.fy if load.y_signal < 0 else torques[load.y_signal]
-    return fx, fy, load.torque if load.torque_signal < 0 else torques[load.torque_signal]
-
-
-@routine
-def apply_loads(system, q, torques, f):
-    """Subtract the generalised forces of loads from f; `torques` has the time-dependent components."""
-    for k in range(system.loads.size):
-        load = system.loads[k]
-        marker = system.markers[load.marker]
-        fx, fy, torque = load_at(load, torques)
-        _, _, _, _, _, _, rx, ry = marker_motion(system, marker, q, q, q)
-        apply_force(system, marker, q, -fx, -fy, rx, ry, f)
-        apply_torque(system, marker, -torque, f)
-
-
-@inlined
 def end_motion(system, marker, x, y, q, v, a):
     """Return the motion of one end of an axis or a line, as `marker_motion` does.
 
@@ -292,19 +272,6 @@ def line_energy(system, q, v):
         energy += 0.5 * system.lines[k].stiffness * stretch * stretch
         power += system.lines[k].damping * rate * rate
     return energy, power
-
-
-@routine
-def load_power(system, q, v, torques):
-    """Return the power of the loads."""
-    power = 0.0
-    for k in range(system.loads.size):
-        load = system.loads[k]
-        marker = system.markers[load.marker]
-        fx, fy, torque = load_at(load, torques)
-        _, _, vx, vy, _, _, _, _ = marker_motion(system, marker, q, v, v)
-        power += fx * vx + fy * vy + torque * marker_angle(system, marker, v)
-    return power
 
 
 @inlined

@@ -23,6 +23,13 @@ NX, NY, SLOPE = range(3)
 POINT, ANGLE, AXIS = range(3)
 # Row kinds: Phi = 0, or a row whose multiplier is the torque or force of a spring, a damper or dry friction.
 CONSTRAINT, SPRING, DAMPER, FRICTION = range(4)
+# Kinds of quantities of a motion, on which forces depend.
+OF_ANGLE, OF_AXIS, OF_COORDINATE = range(3)
+# Operations of laws: without operands, of one operand, of two.
+NUMBER, QUANTITY, TIME, TABLE, NEGATE, ABS, SIN, COS, TAN, ASIN, ACOS, ATAN, SINH, COSH, TANH, EXP, LOG, SQRT = range(
+    18
+)
+ADD, SUBTRACT, MULTIPLY, DIVIDE, MIN, MAX, POWER = range(18, 25)
 # Weights of Phi'', Phi' and Phi for constraints on accelerations, without Baumgarte's terms.
 INDEX_1 = (1.0, 0.0, 0.0)
 # Number of Gauss points of an element. Beside their terms in a vector stands, in BASE, the sum over the elements
@@ -99,7 +106,7 @@ LOAD = _record(
     ("fx", np.float64),  # in the ground frame
     ("fy", np.float64),
     ("torque", np.float64),
-    # Signals of the time-dependent components, -1 for constant ones.
+    # Signals of the time-dependent components, -1 for constant ones, -2 - k for law k.
     ("x_signal", np.int64),
     ("y_signal", np.int64),
     ("torque_signal", np.int64),
@@ -118,6 +125,18 @@ LINE = _record(
     ("stiffness", np.float64),
     ("length", np.float64),
     ("damping", np.float64),
+)
+# A law has the operations first .. end - 1, whose operands a and b are numbers of its operations. The operand a of a
+# quantity or of the time is the number of the quantity or of the signal; b of a table is that of the curve.
+LAW = _record(("first", np.int64), ("end", np.int64))
+OPERATION = _record(("code", np.int64), ("a", np.int64), ("b", np.int64), ("number", np.float64))
+QUANTITY_RECORD = _record(
+    *_ENDS,
+    ("angle", np.float64),  # as for an axis
+    ("between", np.int64),
+    ("kind", np.int64),  # angle of b less that of a, travel of b along an axis of a, coordinate of b
+    ("axis", np.int64),  # 0 for x, 1 for y
+    ("rate", np.int64),  # 1 for the rate of the quantity, else 0
 )
 AXIS_RECORD = _record(
     *_ENDS,
@@ -157,6 +176,12 @@ class PackedSystem(NamedTuple):
     ports: Records
     motor_sides: Records
     loads: Records
+    laws: Records  # laws of loads over the motion, with their operations, quantities and tables
+    operations: Records
+    quantities: Records
+    curve_start: Indices  # first break of each table, then the number of all breaks; pieces as in `Signals`
+    curve_breaks: Array
+    curve_coefficients: Array
     lines: Records  # springs and dampers between points
     axes: Records
     tracks: Records
@@ -227,6 +252,7 @@ class Scratch(NamedTuple):
     lanes: Annotated[Floats, "lanes"]
     rigid: Annotated[Floats, "coordinates"]
     turn: Annotated[Floats, 2]  # cosine and sine of the body's angle
+    registers: Annotated[Floats, "registers"]  # values of the operations of a law
     points: PointScratch | None  # None for linear geometry
 
 
@@ -262,8 +288,9 @@ class Workspace(NamedTuple):
 
 
 def sizes_of(system: PackedSystem) -> dict[str, int]:
-    """Return the number of coordinates n and of constraint rows m."""
-    return {"n": int(np.sum(3 + system.bodies["nf"])), "m": system.rows.size}
+    """Return the number of coordinates n, of constraint rows m, and of operations of the longest law."""
+    longest = int(np.max(system.laws["end"] - system.laws["first"], initial=0))
+    return {"n": int(np.sum(3 + system.bodies["nf"])), "m": system.rows.size, "registers": longest}
 
 
 def make_workspace(system: PackedSystem) -> Workspace:
@@ -293,7 +320,7 @@ def make_scratch(system: PackedSystem) -> Scratch:
     """Allocate the work arrays for the terms of one body."""
     names = ("nf", "width", "stride", "lanes", "pitch")
     nf, width, stride, lanes, pitch = (int(system.bodies[name].max(initial=0)) for name in names)
-    sizes = {"width": width, "stride": stride, "lanes": lanes, "coordinates": padded(3 + nf)}
+    sizes = {"width": width, "stride": stride, "lanes": lanes, "coordinates": padded(3 + nf), **sizes_of(system)}
     points = None
     if system.bending is not None:
         points = allocated(

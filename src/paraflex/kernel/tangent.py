@@ -13,7 +13,8 @@ from paraflex.arrays import Array
 from .arrays import Floats, allocated, apart, fill
 from .compiling import by_reference, inlined, kernel, routine
 from .constraints import joint_rates
-from .joints import apply_torque, end_motion, load_at, marker_angles, marker_motion, row_part
+from .joints import apply_torque, end_motion, marker_angles, marker_motion, row_part
+from .loads import loads_tangent
 from .packed import ANGLE, AXIS, CONSTRAINT, FRICTION, PackedSystem, sizes_of
 from .tangent_axes import axes_tangent
 from .tangent_bodies import body_terms_tangent
@@ -31,6 +32,7 @@ class Tangent(NamedTuple):
     f: Annotated[Floats, "n"]  # change of the residual of the equations of motion
     rows: Annotated[Floats, "m"]  # change of the residual of the rows
     friction: Annotated[Floats, "m"]  # slope of the rows of friction against the rate, at the last `note_slopes`
+    registers: Annotated[Floats, 2, "registers"]  # values of the operations of a law, and their changes
     points: Array | None  # (8, most lanes of mass points of a body) scratch of second-order geometry
 
 
@@ -60,18 +62,6 @@ def joints_tangent(system, i, weights, q, v, a, lam, direction):
             force = (weight * lam[r], weight * lam[r + 1])
             change = (weight * direction.lam[r], weight * direction.lam[r + 1])
             force_tangent(system, marker, q, force, change, (rx, ry), (d_rx, d_ry), direction)
-
-
-@routine
-def loads_tangent(system, q, torques, direction):
-    """Subtract the change of the generalised forces of loads from direction.f."""
-    for k in range(system.loads.size):
-        load = system.loads[k]
-        marker = system.markers[load.marker]
-        _, _, _, _, _, _, rx, ry = marker_motion(system, marker, q, q, q)
-        _, _, _, _, _, _, d_rx, d_ry = marker_tangent(system, marker, q, q, q, direction)
-        fx, fy, _ = load_at(load, torques)
-        force_tangent(system, marker, q, (-fx, -fy), (0.0, 0.0), (rx, ry), (d_rx, d_ry), direction)
 
 
 @routine
@@ -158,7 +148,7 @@ def residual_tangent(system, weights, q, v, a, lam, torques, compliance, first, 
         joints_tangent(system, i, weights, q, v, a, lam, direction)
     axes_tangent(system, weights, q, v, a, lam, torques, direction)
     finish_rows(system, compliance, direction)
-    loads_tangent(system, q, torques, direction)
+    loads_tangent(system, q, v, torques, direction)
     lines_tangent(system, q, v, direction)
 
 

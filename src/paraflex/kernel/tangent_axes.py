@@ -40,15 +40,9 @@ def add_track_tangent(system, axis, x, d_x, force, d_force, direction):
         direction.f[body.offset + 3 + j] -= d_force * value + force * slope * d_x
 
 
-@routine
-def axis_tangent(system, k, q, v, a, direction):
-    """Return the changes for axis k: of value, rate and acceleration; e, its change; lever, its change; x, its change.
-
-    R s of both ends and its changes follow, four numbers each. On a track, as in `axes.axis_motion`, e and lever are
-    those of the normal to the deflected beam.
-    """
-    axis = system.axes[k]
-    at, theta, w, dw, rax, ray, rbx, rby = axis_frame(system, axis, q, v, a)
+@inlined
+def frame_tangent(system, axis, at, q, v, a, direction):
+    """Return the changes of the results of `axes.axis_frame`, the first of which is `at`."""
     pax, pay, vax, vay, aax, aay, d_rax, d_ray = end_tangent(system, axis.a, q, v, a, direction)
     pbx, pby, vbx, vby, abx, aby, d_rbx, d_rby = end_tangent(system, axis.b, q, v, a, direction)
     change = (pbx - pax, pby - pay, vbx - vax, vby - vay, abx - aax, aby - aay)
@@ -58,6 +52,19 @@ def axis_tangent(system, k, q, v, a, direction):
     if axis.between:
         # As n . d is zero, the second derivative is stationary in w and does not depend on dw.
         turn, d_w, d_dw = line_turn(at[0], at[1], change[0], change[1]), 0.0, 0.0
+    return change, turn, d_w, d_dw, d_rax, d_ray, d_rbx, d_rby
+
+
+@routine
+def axis_tangent(system, k, q, v, a, direction):
+    """Return the changes for axis k: of value, rate and acceleration; e, its change; lever, its change; x, its change.
+
+    R s of both ends and its changes follow, four numbers each. On a track, as in `axes.axis_motion`, e and lever are
+    those of the normal to the deflected beam.
+    """
+    axis = system.axes[k]
+    at, theta, w, dw, rax, ray, rbx, rby = axis_frame(system, axis, q, v, a)
+    change, turn, d_w, d_dw, d_rax, d_ray, d_rbx, d_rby = frame_tangent(system, axis, at, q, v, a, direction)
     ex, ey = cos(theta), sin(theta)
     d_ex, d_ey = -turn * ey, turn * ex
     _, _, _, lever = component(ex, ey, at, w, dw)

@@ -39,6 +39,7 @@ from .joints import (
     WeldJoint as WeldJoint,
     points_named as points_named,
 )
+from .laws import ForceLaw as ForceLaw, MotionQuantity as MotionQuantity
 from .loads import (
     AppliedTorque as AppliedTorque,
     JointFriction as JointFriction,

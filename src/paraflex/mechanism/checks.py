@@ -8,9 +8,10 @@ from .bodies import FlexibleBeam
 from .body_checks import check_body
 from .groups import Group, grouped, groups_of
 from .joints import GROUND, PointRef, points_named
+from .laws import MotionQuantity
 from .members import Assembly, Members
 from .poses import approximate_poses, placed_poses
-from .quantities import check_numbers, finite, joints_named, known
+from .quantities import JointThat, check_numbers, finite, joints_named, known
 from .rotors import check_actuators
 from .sensors import Sensor
 
@@ -156,6 +157,20 @@ def check_loads(mechanism: Members) -> None:
     for group, members in grouped(mechanism):
         for member in members if group.kinds else ():
             _check_points_of(mechanism, group, member)
+    for load in mechanism.loads:
+        for law in load.laws:
+            for quantity in law.quantities.values():
+                _check_quantity(mechanism, quantity, f"load.{load.name}.{law.field}")
+
+
+def _check_quantity(mechanism: Members, quantity: MotionQuantity, field: str) -> None:
+    """Check that the joint or point of a quantity exists, and that the joint has such a coordinate."""
+    if quantity.point is not None:
+        known_point(mechanism, quantity.point, field)
+        return
+    known(quantity.joint, mechanism.joints_by_name, field, "joint")
+    does: dict[str, JointThat] = {"angle": "turns", "travel": "slides", "rate": "moves"}
+    mechanism.joint(quantity.joint).check_moves(field, does[quantity.word])
 
 
 def _check_points_of(mechanism: Members, group: Group, member: Any) -> None:

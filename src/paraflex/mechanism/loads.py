@@ -1,7 +1,8 @@
 """Forces on a mechanism other than those of motors: springs, dampers, friction, applied forces and torques."""
 
-from dataclasses import dataclass, field
-from typing import ClassVar
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from typing import ClassVar, Self
 
 import numpy as np
 
@@ -9,7 +10,8 @@ from paraflex.arguments import CheckedFields, named_in_errors
 from paraflex.arrays import Array
 from paraflex.errors import within
 from .joints import PointRef
-from .profiles import TimeProfile, marks
+from .laws import ForceLaw
+from .profiles import ConstantSpeed, TimeProfile, marks
 from .quantities import AT_JOINT, field_metadata, finite, not_negative, optional, positive
 
 
@@ -111,10 +113,21 @@ named_in_errors(
 named_in_errors("two numbers or profiles in time", "[x, y], each a number or a profile in time")(tuple[InTime, InTime])
 
 
-def _finite_or_profile(values: InTime | tuple[InTime, ...], field: str) -> None:
+InMotion = float | TimeProfile | ForceLaw
+named_in_errors("a number, a profile in time or a law", "a number, a profile in time, or a ForceLaw over the motion")(
+    InMotion
+)
+named_in_errors("two numbers, profiles or laws", "[x, y], each a number, a profile in time or a ForceLaw")(
+    tuple[InMotion, InMotion]
+)
+# The time itself, a signal of laws that contain it.
+_CLOCK = ConstantSpeed(0.0, 1.0)
+
+
+def _finite_or_profile(values: InMotion | tuple[InMotion, ...], field: str) -> None:
     """Check that numbers are finite; profiles are checked on evaluation."""
     several = values if isinstance(values, tuple) else (values,)
-    finite([each for each in several if not isinstance(each, TimeProfile)], field)
+    finite([each for each in several if not isinstance(each, TimeProfile | ForceLaw)], field)
 
 
 def value_in_time(given: InTime, t: Array) -> Array:
@@ -134,18 +147,33 @@ class _Load(CheckedFields):
     point: PointRef = field(metadata=field_metadata('"body.point"'))
 
     @property
-    def components(self) -> tuple[InTime, ...]:
+    def components(self) -> tuple[InMotion, ...]:
         """Force along x and y in the ground frame [N], or the torque [N m]."""
         given = getattr(self, self.kind)
         return given if isinstance(given, tuple) else (given,)
 
     @property
+    def laws(self) -> tuple[ForceLaw, ...]:
+        """Components that are laws over the motion."""
+        return tuple(each for each in self.components if isinstance(each, ForceLaw))
+
+    @property
     def profiles(self) -> tuple[TimeProfile, ...]:
-        """Components that are profiles in time."""
-        return tuple(each for each in self.components if isinstance(each, TimeProfile))
+        """Profiles in time of components, and the time itself for laws that contain it, in their order."""
+        found = (_CLOCK if isinstance(each, ForceLaw) and each.in_time else each for each in self.components)
+        return tuple(each for each in found if isinstance(each, TimeProfile))
+
+    def moved(self, points: Mapping[PointRef, PointRef]) -> Self:
+        """Return the load with the points of its laws replaced by others, where `points` has them."""
+        if not self.laws:
+            return self
+        parts = [each.moved(points) if isinstance(each, ForceLaw) else each for each in self.components]
+        return replace(self, **{self.kind: tuple(parts) if len(parts) > 1 else parts[0]})
 
     def evaluate(self, t: Array) -> Array:
         """Evaluate the components at times t (k,) [s]: (k, 2) of a force [N], (k, 1) of a torque [N m].
+
+        A law over the motion has no value at a time alone, NaN.
 
         Raises
         ------
@@ -153,7 +181,7 @@ class _Load(CheckedFields):
             A profile does not cover a time or is not finite there.
         """
         with within(f"load.{self.name}"):
-            each = [value_in_time(one, t) for one in self.components]
+            each = [value_in_time(np.nan if isinstance(one, ForceLaw) else one, t) for one in self.components]
         return np.stack(each, axis=1)
 
     def largest(self, t: Array) -> float:
@@ -164,27 +192,30 @@ class _Load(CheckedFields):
 
 @dataclass(frozen=True)
 class PointForce(_Load):
-    """Force [N] at a named point of a body, in the ground frame; each component is a number or a profile in time."""
+    """Force [N] at a named point of a body, in the ground frame: numbers, profiles in time, or laws."""
 
     kind: ClassVar[str] = "force"
     unit: ClassVar[str] = "N"
 
-    force: tuple[InTime, InTime] = field(
+    force: tuple[InMotion, InMotion] = field(
         metadata=field_metadata(
-            "[x, y] in the ground frame in N, numbers or expressions of the time t", _finite_or_profile
+            "[x, y] in the ground frame in N, numbers or expressions of the time t, joints and points",
+            _finite_or_profile,
         )
     )
 
 
 @dataclass(frozen=True)
 class AppliedTorque(_Load):
-    """Torque [N m] on the material at a named point of a body, a number or a profile in time."""
+    """Torque [N m] on the material at a named point of a body, a number, a profile in time or a law."""
 
     kind: ClassVar[str] = "torque"
     unit: ClassVar[str] = "N m"
 
-    torque: InTime = field(
-        metadata=field_metadata("the torque in N m, numbers or expressions of the time t", _finite_or_profile)
+    torque: InMotion = field(
+        metadata=field_metadata(
+            "the torque in N m, a number or an expression of the time t, joints and points", _finite_or_profile
+        )
     )
 
 

@@ -14,6 +14,7 @@ from .cut import Cut
 from .gears import Gear, Relation, SumRelation
 from .groups import Group, group, grouped
 from .joints import GROUND, Joint, Motor, PointRef, PrescribedAngle, points_named
+from .laws import ForceLaw
 from .loads import AppliedTorque, JointFriction, LinearSpring, Load, PointForce, TorsionalDamper, TorsionalSpring
 from .payload import Payload
 from .quantities import field_metadata, joints_named, known, optional
@@ -207,6 +208,13 @@ class Members(CheckedFields):
         """Points that a joint, a spring, a load, another member or the end-effector refers to."""
         used = {point for _, members in grouped(self) for one in members for point in points_named(one).values()}
         return used if self.end_effector is None else used | {self.end_effector.point}
+
+    def points_of(self, law: ForceLaw) -> list[PointRef]:
+        """Return the points on whose motion a law depends, those of its joints included."""
+        points: list[PointRef] = []
+        for one in law.quantities.values():
+            points += [one.point] if one.point else [self.joint(one.joint).a, self.joint(one.joint).b]
+        return points
 
     @checked_arguments()
     def reached(self, start: str, past: str = "") -> set[str]:

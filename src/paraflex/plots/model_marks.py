@@ -8,7 +8,7 @@ import numpy as np
 from paraflex.arrays import Array
 from paraflex.mechanism import GROUND, AssumedModesBeam, FlexibleBeam
 from paraflex.mechanism.sensors import Location, Sensor
-from paraflex.results.acting import ActingLoad, acting_load
+from paraflex.results.acting import ActingLoad
 from paraflex.results.posed import Posed
 from .marks import round_arrow, straight_arrow
 from .scene import ARROW, BLOCK, TURN, DrawnJoint, Limits, Scene
@@ -58,7 +58,7 @@ class Acting:
 
 def acting_arrows(posed: Posed, shown: Scene, limits: Limits) -> Acting:
     """Return the arrows of a mechanism at its start pose."""
-    acting = [acting_load(load, posed.duration) for load in posed.mechanism.loads]
+    acting = posed.acting
     largest = {kind: max((one.largest for one in acting if one.load.kind == kind), default=0.0) for kind in
                ("force", "torque")}  # fmt: skip
     loads = [_load_arrow(posed, one, largest[one.load.kind], limits) for one in acting]
@@ -68,8 +68,8 @@ def acting_arrows(posed: Posed, shown: Scene, limits: Limits) -> Acting:
 def load_places(posed: Posed, size: float) -> Array:
     """Return the tails (n, 2) of the arrows of forces, all of the largest length, in a picture of a size [m]."""
     tails = [np.zeros((0, 2))]
-    for load in posed.mechanism.loads:
-        shown = acting_load(load, posed.duration).shown
+    for one in posed.acting:
+        load, shown = one.load, one.shown
         if load.kind == "force" and shown.any():
             tails.append((posed.place(load.point) - ARROW * size * shown / np.linalg.norm(shown))[None])
     return np.concatenate(tails)

@@ -38,6 +38,8 @@ class ActingLoad:
         Largest magnitude [N, N m].
     grows : bool
         Whether the load is zero at the start and acts immediately after it.
+    at_pose : bool
+        Whether the load is a law over the motion, and known in the start pose only.
     """
 
     load: Load
@@ -45,6 +47,7 @@ class ActingLoad:
     begins: float | None
     largest: float
     grows: bool = False
+    at_pose: bool = False
 
     @property
     def later(self) -> bool:
@@ -55,6 +58,8 @@ class ActingLoad:
     def size(self) -> str:
         """Description of the size with unit: value at the start, or largest value and onset."""
         unit = self.load.unit
+        if self.at_pose:
+            return f"{_sized(self.largest, unit)} at the start, varies with the motion"
         if self.begins is None:
             return f"0 {unit}"
         if self.later:
@@ -66,7 +71,7 @@ class ActingLoad:
         return _sized(first, unit) + more
 
 
-def acting_load(load: Load, duration: float | None = None) -> ActingLoad:
+def acting_load(load: Load, duration: float | None = None, at_start: Array | None = None) -> ActingLoad:
     """Return the onset and size of a load over a study.
 
     Parameters
@@ -75,7 +80,13 @@ def acting_load(load: Load, duration: float | None = None) -> ActingLoad:
         Force or torque.
     duration : float, optional
         Duration of the study [s]; by default the first second, or up to the last knot if that is later.
+    at_start : (3,) array, optional
+        Force [N] and torque [N m] in the start pose at rest, of a load that has laws over the motion.
     """
+    if load.laws:
+        shown = np.zeros(3) if at_start is None else at_start
+        shown = shown[:2] if load.kind == "force" else shown[2:]
+        return ActingLoad(load, shown, 0.0, float(np.linalg.norm(shown)), at_pose=True)
     times = _times(load.profiles, duration)
     values = load.evaluate(times)
     sizes = np.linalg.norm(values, axis=1)
@@ -125,8 +136,11 @@ def first_movements_along(system: System, q: Array) -> dict[str, int]:
 
 
 def load_variables(mechanism: Mechanism, times: Array) -> Mapping[str, tuple[tuple[str, ...], Array]]:
-    """Return forces and torques of all loads at times (k,): zero where a load has none, empty without loads."""
-    if not mechanism.loads:
+    """Return forces and torques of all loads at times (k,): zero where a load has none, empty without loads.
+
+    Empty with laws over the motion as well: the links of a run have the values of their loads.
+    """
+    if not mechanism.loads or any(load.laws for load in mechanism.loads):
         return {}
     force, torque = np.zeros((len(times), len(mechanism.loads), 2)), np.zeros((len(times), len(mechanism.loads)))
     for k, load in enumerate(mechanism.loads):

@@ -15,6 +15,7 @@ from paraflex.dynamics.joint_loads import (
     load_errors,
     undetermined_loads,
 )
+from paraflex.dynamics.load_values import load_values
 from paraflex.dynamics.points import PointMotion, marker_motion, point_motion
 from paraflex.dynamics.sections import Sections
 from paraflex.integrators import Solution
@@ -115,6 +116,9 @@ def system_links(system: System, solution: Solution, torques: Array, samples: in
         variables["drive_torque"] = (("drive",), torque)
         variables["drive_speed"] = (("drive",), stacked([coordinates[one.joint].rate for one in drives], samples))
     variables |= {"frame_force": (("axis",), frame.force), "frame_moment": ((), frame.moment)}
+    if any(load.laws for load in mechanism.loads):
+        acting = load_values(system, solution.t[:samples], q, v)[:, : len(mechanism.loads)]
+        variables |= {"load_force": (("load", "axis"), acting[..., :2]), "load_torque": (("load",), acting[..., 2])}
     if sensors:
         readings = sensor_readings(system, q, v, a, multipliers, torques[:samples])
         given = [one.name for one in system.mechanism.sensors]

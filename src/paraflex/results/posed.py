@@ -7,6 +7,7 @@ import numpy as np
 
 from paraflex.arrays import Array
 from paraflex.dynamics import System, closure_of, moment_signals, reference_pose, standing_system, start_state
+from paraflex.dynamics.load_values import load_values
 from paraflex.dynamics.projection import joint_gaps, row_unit
 from paraflex.dynamics.rank import joint_of_row
 from paraflex.errors import InputError, NumericalError
@@ -14,7 +15,7 @@ from paraflex.formatting import number
 from paraflex.mechanism import Mechanism, PointRef, Start
 from paraflex.mechanism.masses import with_any_masses
 from paraflex.paths import Path, follow_path
-from .acting import first_movements, first_movements_along
+from .acting import ActingLoad, acting_load, first_movements, first_movements_along
 from .drawing import DrawnRun, drawing_data, system_drawing
 
 # Number of poses along a path, which give the length of rails, and of points of the drawn path.
@@ -51,6 +52,8 @@ class Posed:
         Signs of the first movement of joints with prescribed motions, and with motors along the path; 0 if at rest.
     duration : float or None
         Duration of the study [s], if known.
+    loads : (loads, 3) array or None
+        Force [N] and torque [N m] of every load at rest, if any has laws over the motion.
     """
 
     mechanism: Mechanism
@@ -64,6 +67,7 @@ class Posed:
     angles: Mapping[str, float] = field(default_factory=dict)
     moves: Mapping[str, int] = field(default_factory=dict)
     duration: float | None = None
+    loads: Array | None = None
 
     def place(self, ref: PointRef) -> Array:
         """Return the position (2,) of a point [m]."""
@@ -71,6 +75,12 @@ class Posed:
             return np.array(self.mechanism.ground[ref.point], dtype=float)
         station = int(self.data["point_station"].values[list(self.data["point"].values).index(str(ref))])
         return self.data["shape"].values[0, station].astype(float)
+
+    @property
+    def acting(self) -> list[ActingLoad]:
+        """Onsets and sizes of all loads over the study."""
+        found = enumerate(self.mechanism.loads)
+        return [acting_load(one, self.duration, None if self.loads is None else self.loads[k]) for k, one in found]
 
     @property
     def closes(self) -> bool:
@@ -172,7 +182,10 @@ def _of(
 ) -> Posed:
     data = drawing_data(mechanism, system_drawing(system, q), np.arange(len(q), dtype=float))
     angles = {body.name: float(q[0][system.body(body.name).angle]) for body in mechanism.bodies}
-    drawn = Posed(mechanism, assembly, data, problems=problems, angles=angles)
+    loads = None
+    if any(load.laws for load in mechanism.loads):
+        loads = load_values(system, np.zeros(1), q[:1], np.zeros_like(q[:1]))[0]
+    drawn = Posed(mechanism, assembly, data, problems=problems, angles=angles, loads=loads)
     carried, effector = mechanism.payload, mechanism.end_effector
     if carried is not None and effector is not None:
         # The offset is rotated with the rigid body that carries the payload.

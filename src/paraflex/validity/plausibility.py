@@ -2,7 +2,7 @@
 
 import itertools
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -11,6 +11,7 @@ import numpy as np
 from paraflex.arrays import Array
 from paraflex.dynamics import System, joint_coordinate, missing_rotations
 from paraflex.dynamics.joint_loads import drive_torques, load_errors, undetermined_loads
+from paraflex.dynamics.load_values import largest_loads
 from paraflex.dynamics.rank import joint_of_row
 from paraflex.dynamics.sections import sections_of
 from paraflex.findings import RESOLVED, Finding
@@ -181,7 +182,7 @@ def _large_slopes(where: _Context, system: System, solution: Solution) -> Iterat
     if slopes[worst][k] > STEEP:
         blame = where.likely_cause(worst) or (
             f"look at section and Young's modulus of {worst}, and at its motion and loads"
-            + _moving(where.mechanism, solution)
+            + _moving(where.mechanism, system, solution)
         )
         yield Finding(
             "deflection-large", where.place,
@@ -208,7 +209,7 @@ def implausible_stresses(system: System, solution: Solution, where: _Context | N
             f"{1.0 / used[k, station]:.2g}",
             where.likely_cause(name) or (
                 f"give {name} a stronger section or material, or move and load it less"
-                + _moving(where.mechanism, solution)
+                + _moving(where.mechanism, system, solution)
             ),
         )  # fmt: skip
 
@@ -332,7 +333,8 @@ def implausible_torques(
     mechanism = mechanism or system.mechanism
     where = _Context(f"mode {driven.mode}", mechanism)
     size = mechanism_size(mechanism) or system.size
-    force, turning = _expected(system, mechanism, driven.acceleration, t)
+    # Laws over the motion are not known here, NaN, and there is no finding.
+    force, turning = _expected(system, mechanism, driven.acceleration, [one.largest(t) for one in mechanism.loads])
     for motor, peak in driven.peaks.items():
         unit = driven.units[motor]
         expected = force * size + turning if unit == "N m" else force + turning / size
@@ -345,10 +347,13 @@ def implausible_torques(
             )  # fmt: skip
 
 
-def _expected(system: System, mechanism: Mechanism, acceleration: float, t: Array) -> tuple[float, float]:
-    """Return the force that accelerates and holds the total mass, with all loads [N]; and the applied torques [N m]."""
-    loads = sum(one.largest(t) for one in mechanism.loads if isinstance(one, PointForce))
-    turning = sum(one.largest(t) for one in mechanism.loads if not isinstance(one, PointForce))
+def _expected(system: System, mechanism: Mechanism, acceleration: float, sizes: Sequence[float]) -> tuple[float, float]:
+    """Return the force that accelerates and holds the total mass, with all loads [N]; and the applied torques [N m].
+
+    `sizes` are the largest magnitudes of the loads.
+    """
+    loads = sum(size for one, size in zip(mechanism.loads, sizes, strict=False) if isinstance(one, PointForce))
+    turning = sum(size for one, size in zip(mechanism.loads, sizes, strict=False) if not isinstance(one, PointForce))
     felt = max(acceleration + math.hypot(*mechanism.gravity), STANDARD_GRAVITY)
     return system.total_mass * felt + loads, turning
 
@@ -360,7 +365,9 @@ def _large_forces(where: _Context, system: System, solution: Solution) -> Iterat
     # A mechanism of one point has no size of its own.
     size = mechanism_size(where.mechanism) or system.size
     accelerations = np.stack([np.linalg.norm(solution.a[:, body.position], axis=1) for body in system.bodies])
-    expected, turning = _expected(system, where.mechanism, float(np.median(np.max(accelerations, axis=0))), solution.t)
+    acceleration = float(np.median(np.max(accelerations, axis=0)))
+    sizes = largest_loads(system, solution.t, solution.q, solution.v)
+    expected, turning = _expected(system, where.mechanism, acceleration, sizes)
     # Entries are NaN at singular configurations, and for rows without multipliers in a method.
     sustained = np.quantile(np.nan_to_num(np.abs(solution.multipliers)), 1.0 - _PEAK_SHARE, axis=0)
     sustained[~system.constrained] = 0.0
@@ -386,14 +393,15 @@ def _resisting(mechanism: Mechanism) -> str:
     return f"look at {', '.join(named)}, and their units" if named else ""
 
 
-def _moving(mechanism: Mechanism, solution: Solution) -> str:
+def _moving(mechanism: Mechanism, system: System, solution: Solution) -> str:
     """List prescribed motions with their largest rates, and loads with their sizes."""
     named: list[str] = []
     for one in mechanism.prescribed:
         rate = float(np.max(np.abs(one.profile.evaluate(solution.t)[1])))
         unit = "m/s" if mechanism.slides(one.joint) else "rad/s"
         named.append(f"prescribed.{one.name} (up to {speed_text(rate, unit, 3)})")
-    named += [f"load.{load.name} ({load.largest(solution.t):.3g} {load.unit})" for load in mechanism.loads]
+    sizes = largest_loads(system, solution.t, solution.q, solution.v)
+    named += [f"load.{load.name} ({size:.3g} {load.unit})" for load, size in zip(mechanism.loads, sizes, strict=False)]
     return f": {', '.join(named)}" if named else ""
 
 

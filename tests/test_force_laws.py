@@ -1,0 +1,215 @@
+"""Forces over the motion: closed forms, springs and dampers that they stand for, all methods, files, messages."""
+
+import tomllib
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+import paraflex as pf
+from conftest import make_five_bar
+from paraflex import ForceLaw, InputError
+from paraflex.dynamics import build_system
+from paraflex.dynamics.load_values import load_values
+from paraflex.files import ExpressionProfile, model_from
+from paraflex.integrators import IntegrationOptions
+from paraflex.mechanism import (
+    AppliedTorque,
+    Motor,
+    PointForce,
+    PointRef,
+    TabulatedProfile,
+    TorsionalDamper,
+    TorsionalSpring,
+    raparm_i,
+)
+from paraflex.motion import simulate_motion
+from paraflex.paths import Line
+from paraflex.results import tracking_dataset
+from paraflex.tracking import plan_tracking
+from test_loads import MASS, pendulum
+from test_loads_in_time import K, slider
+
+DAMPING, REST = 2.0, 0.3
+FINE = IntegrationOptions(tolerance=1e-8)
+
+
+def oscillator(**changes):
+    force = ForceLaw("-k * (rail.travel - x0) - c * rail.rate", {"k": K, "c": DAMPING, "x0": REST})
+    return slider(force, **changes)
+
+
+def damped(t):
+    pace, decay = np.sqrt(K / MASS - (0.5 * DAMPING / MASS) ** 2), 0.5 * DAMPING / MASS
+    return REST * (1.0 - np.exp(-decay * t) * (np.cos(pace * t) + decay / pace * np.sin(pace * t)))
+
+
+@pytest.mark.parametrize("method", ["esdirk5", "tr-bdf2", "generalised-alpha", "radau", "bdf", "ida", "rk45"])
+def test_an_oscillator_by_every_kind_of_method(method):
+    run = simulate_motion(oscillator(), 2.0, samples=41, options=IntegrationOptions(method=method, tolerance=1e-7))
+    assert_allclose(run.solution.q[:, 0], damped(run.times), rtol=0, atol=1e-5)
+    # The force's work is all the energy there is.
+    assert run.solution.energy_balance_max < 1e-4
+
+
+def springs(mechanism, joint="rail"):
+    """A spring and a damper at the joint, in place of laws."""
+    spring, damper = TorsionalSpring("k", joint, K, rest=REST), TorsionalDamper("c", joint, DAMPING)
+    return replace(mechanism, loads=(), springs=(spring,), dampers=(damper,))
+
+
+def turning(word):
+    """The pendulum with a torque by law at its pin, which is all that a spring and a damper there do."""
+    law = ForceLaw(f"-k * (pin.angle - x0) - c * {word}", {"k": K, "c": DAMPING, "x0": REST})
+    return pendulum(loads=(AppliedTorque("turn", PointRef("arm", "A"), law),), gravity=(0.0, -9.81))
+
+
+@pytest.mark.parametrize("made", [oscillator(), turning("pin.rate")], ids=["slides", "turns"])
+def test_a_law_is_the_spring_and_the_damper_that_it_stands_for(made):
+    joint = made.joints[0].name
+    runs = [simulate_motion(each, 1.0, samples=11, options=FINE) for each in (made, springs(made, joint))]
+    for name, within in (("q", 1e-6), ("v", 2e-5), ("a", 4e-4)):
+        assert_allclose(getattr(runs[0].solution, name), getattr(runs[1].solution, name), rtol=0, atol=within)
+    poles = [
+        np.sort_complex(pf.linearise(replace(each, motors=(Motor("m", joint),))).poles())
+        for each in (made, springs(made, joint))
+    ]
+    assert_allclose(poles[0], poles[1], rtol=1e-9)
+
+
+def test_a_law_in_time_and_a_table_over_the_travel_are_what_they_say():
+    """t and a linear table; a table's first and last values hold beyond its ends."""
+    table = TabulatedProfile((-1.0, 0.0, 0.1, 5.0), (0.0, 0.0, -3.0, -3.0), "linear")
+    both = [
+        slider(ForceLaw("2 + sin(4 * t) + 0 * rail.travel")),
+        slider(ExpressionProfile("2 + sin(4 * t)")),
+        slider(ForceLaw("rail.travel", table=table)),
+        slider(ForceLaw("-30 * min(max(rail.travel, 0), 0.1)")),
+    ]
+    ends = [simulate_motion(each, 0.7, samples=3, options=FINE).solution.q[:, 0] for each in both]
+    assert_allclose(ends[0], ends[1], rtol=0, atol=1e-6)
+    assert_allclose(ends[2], ends[3], rtol=0, atol=1e-6)
+    found = load_values(
+        build_system(both[2]), np.zeros(4), np.array([[x, 0, 0] for x in (-9, 0.05, 0.1, 80)]), np.zeros((4, 3))
+    )
+    assert_allclose(found[:, 0, 0], [0.0, -1.5, -3.0, -3.0], rtol=0, atol=1e-15)
+    spline = TabulatedProfile((-1.0, 0.0, 0.2, 1.0, 2.0, 4.0), (1.0, 2.0, -1.0, 0.0, 3.0, 2.0))
+    places = np.linspace(-1.0, 4.0, 41)
+    q = np.column_stack([places, np.zeros((41, 2))])
+    found = load_values(build_system(slider(ForceLaw("rail.travel", table=spline))), places, q, 0.0 * q)
+    assert_allclose(found[:, 0, 0], spline.evaluate(places)[0], rtol=0, atol=1e-12)
+
+
+def test_statics_balance_a_hardening_law_and_give_its_stiffness():
+    """2 N against 5 x + 100 x^3."""
+    hardening = slider(ForceLaw("-5 * rail.travel - 100 * rail.travel**3"))
+    found = pf.statics(hardening, loads={"rail": 2.0}, stiffness=["rail"], steps=4)
+    data = pf.statics_dataset(found)
+    (x,) = [root.real for root in np.roots([100.0, 0.0, 5.0, -2.0]) if abs(root.imag) < 1e-12]
+    assert data["joint_coordinate"].sel(joint="rail").values[-1] == pytest.approx(x, rel=1e-9)
+    assert found.stiffness("rail")[-1] == pytest.approx(5.0 + 300.0 * x**2, rel=1e-9)
+
+
+def test_torques_along_a_path_carry_laws():
+    """The tool's force by a law of its place and speed, taken by the motors; and in results the same force."""
+    push = (ForceLaw("-20 * (distal2.C.x - 0.01) - 3 * distal2.C.vx"), ForceLaw("5 * sin(A1.angle) + t"))
+    loads = (PointForce("tool", PointRef("distal2", "C"), push),)
+    mechanism = replace(make_five_bar(), loads=loads)
+    task = plan_tracking(mechanism, Line((0.0, 0.30), (0.04, 0.27), 20.0), duration=0.2, samples=41)
+    run = task.simulate("++", options=FINE)
+    assert np.max(np.linalg.norm(run.driven.actual - run.driven.desired, axis=1)) < 1e-6
+    data = tracking_dataset([run])
+    place, speed = (data[name].sel(point="distal2.C", axis="x")[0] for name in ("point_position", "point_velocity"))
+    expected = -20.0 * (place - 0.01) - 3.0 * speed
+    assert_allclose(data["load_force"].sel(load="tool", axis="x")[0], expected, rtol=0, atol=1e-12)
+    angle = data["joint_coordinate"].sel(joint="A1")[0]
+    assert_allclose(
+        data["load_force"].sel(load="tool", axis="y")[0], 5 * np.sin(angle) + data["time"], rtol=0, atol=1e-12
+    )
+
+
+def test_finite_segments_and_frames_have_laws_of_points_on_their_parts():
+    law = ForceLaw("-300 * (link1.B1.y - 0.2) - 2 * link1.B1.vy")
+    loads = (PointForce("hold", PointRef("link1", "B1"), (0.0, law)),)
+    mechanism = replace(raparm_i(), loads=loads)
+    line = Line((0.0, 0.264), (0.01, 0.264), 5.0)
+    task = plan_tracking(mechanism, line, duration=0.05, samples=6)
+    whole = task.simulate("++++").driven.actual
+    framed = mechanism.with_bodies([replace(mechanism.body("link1"), frames=2, elements=4)])
+    for other in (task.in_segments(12), task.remodelled(framed)):
+        assert_allclose(other.simulate("++++").driven.actual, whole, rtol=0, atol=2e-5)
+
+
+PRESS = """
+name = "press"
+[parameters]
+k = "40 N/mm"
+[ground]
+O = [0, 0]
+[body.ram]
+type = "rigid"
+mass = 0.05
+inertia = 1e-5
+points = { B = [0, 0], "T-1" = [0, "-30 mm"] }
+[joint.guide]
+type = "prismatic"
+points = ["ground.O", "ram.B"]
+[assembly.start]
+ram = 0
+[load.press]
+type = "force"
+point = "ram.B"
+force = ["-k * max(0, guide.travel - 20 mm) - 30 N s/m * guide.rate", "'ram.T-1.vy' * 3"]
+[load.stroke]
+type = "torque"
+point = "ram.B"
+over = "1000 * guide.travel"
+table = [[0, 0], [10, 2], [20, 5]]
+interpolation = "linear"
+[study]
+duration = 0.1
+"""
+
+
+def read(text=PRESS):
+    return model_from(tomllib.loads(text), "press.toml")
+
+
+def test_files_hold_laws(tmp_path):
+    model = read()
+    (force, vertical), torque = model.mechanism.loads[0].force, model.mechanism.loads[1].torque
+    assert (force.parameters, vertical.parameters, torque.table.values) == ({"k": 4e4}, {}, (0.0, 2.0, 5.0))
+    assert torque.text == "1000 * guide.travel"
+    model.save(tmp_path / "again.toml")
+    assert pf.load(tmp_path / "again.toml").mechanism == model.mechanism
+    system = build_system(model.mechanism)
+    found = load_values(system, np.zeros(1), np.array([[0.021, 0.0, 0.0]]), np.array([[0.1, 2.0, 0.0]]))
+    assert_allclose(found[0], [[-40.0 - 3.0, 6.0, 0.0], [0.0, 0.0, 5.0]], rtol=0, atol=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "says"),
+    [
+        ("guide.travel - 20 mm", "guide.angle - 20 mm", "a sum of quantities in rad and in m"),
+        ("'ram.T-1.vy' * 3", "guide.angle", "load.press.force.1: a prismatic joint has a travel and not an angle"),
+        ("'ram.T-1.vy' * 3", "gide.rate", "unknown joint (got 'gide')"),
+        ("'ram.T-1.vy' * 3", "ram.C.y", "load.press.force.1: unknown point (got 'ram.C')"),
+        ("'ram.T-1.vy' * 3", "ram.B.z", "ram.B has x, y, vx, vy"),
+        ("'ram.T-1.vy' * 3", "guide.x", "a joint has angle, travel, rate"),
+        ("'ram.T-1.vy' * 3", "step(guide.travel)", 'a force must not jump as "step" does'),
+        ("'ram.T-1.vy' * 3", "max(guide.travel)", "max takes two arguments, not 1"),
+        ("'ram.T-1.vy' * 3", "guide.travel * q", 'unknown parameter "q"'),
+        ("'ram.T-1.vy' * 3", "5 mm * guide.travel", "a quantity in m^2 where one in N is asked for"),
+        ('over = "1000 * guide.travel"', 'over = "2 * t"', "load.stroke.over: contains no joint and no point"),
+        ("table = [[0, 0], [10, 2], [20, 5]]", "torque = 3", "load.stroke.over: is for tables only"),
+        ("[10, 2], [20, 5]", "[20, 2], [10, 5]", "ascend"),
+    ],
+)
+def test_mistakes_are_named(old, new, says):
+    text = PRESS.replace(old, new)
+    if "torque = 3" in text:
+        text = text.replace('interpolation = "linear"\n', "")
+    with pytest.raises(InputError) as error:
+        read(text)
+    assert says in str(error.value)
