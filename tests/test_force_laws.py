@@ -16,9 +16,14 @@ from paraflex.files import ExpressionProfile, model_from
 from paraflex.integrators import IntegrationOptions
 from paraflex.mechanism import (
     AppliedTorque,
+    Assembly,
+    LinearSpring,
+    Mechanism,
     Motor,
     PointForce,
     PointRef,
+    RevoluteJoint,
+    RigidBody,
     TabulatedProfile,
     TorsionalDamper,
     TorsionalSpring,
@@ -76,6 +81,46 @@ def test_a_law_is_the_spring_and_the_damper_that_it_stands_for(made):
         for each in (made, springs(made, joint))
     ]
     assert_allclose(poles[0], poles[1], rtol=1e-9)
+
+
+def tied(**spring):
+    """The pendulum held by a spring between its tip and the ground, whose force on the ground is in results."""
+    cord = LinearSpring("cord", PointRef("ground", "O"), PointRef("arm", "B"), **spring)
+    return pendulum(linear_springs=(cord,), ground={"O": (0.2, 0.1), "W": (0.1, -0.3)}, gravity=(0.0, -9.81))
+
+
+def test_a_characteristic_is_the_spring_that_it_stands_for():
+    law = ForceLaw("k * (cord.length - 0.2) + 3 * cord.length_rate", {"k": 90.0})
+    cords = [{"stiffness": 90.0, "length": 0.2, "damping": 3.0}, {"force": law}]
+    made = [tied(**one) for one in cords]
+    made = [replace(one, linear_springs=(replace(one.linear_springs[0], a=PointRef("ground", "W")),)) for one in made]
+    runs = [simulate_motion(one, 1.0, samples=11, options=FINE) for one in made]
+    assert_allclose(runs[1].solution.q, runs[0].solution.q, rtol=0, atol=1e-6)
+    assert runs[1].solution.energy_balance_max < 1e-5
+    one, other = (pf.motion_dataset(run) for run in runs)
+    assert_allclose(other["frame_force"], one["frame_force"], rtol=0, atol=1e-3)
+    assert_allclose(other["frame_moment"], one["frame_moment"], rtol=0, atol=1e-3)
+
+
+def test_a_load_and_its_reaction_leave_the_momentum_as_it_is():
+    """Two free bars: a torque by law between them turns both, and a force between their ends moves both."""
+    bars = tuple(RigidBody(name, MASS, 0.02, points={"A": (0.0, 0.0), "B": (0.3, 0.0)}) for name in ("one", "two"))
+    law, ref = ForceLaw("5 * sin(2 * pin.angle) - 0.1 * pin.rate"), PointRef
+    spring = AppliedTorque("twist", ref("two", "A"), law, reaction=ref("one", "B"))
+    push = PointForce("push", ref("two", "A"), (ForceLaw("two.A.x"), 2.0), reaction=ref("one", "B"))
+    assembly = Assembly("start", {"one": 0.0, "two": 0.4}, {ref("one", "A"): (0.0, 0.0)})
+    pin = RevoluteJoint("pin", ref("one", "B"), ref("two", "A"))
+    free = Mechanism("bars", {}, bars, (pin,), loads=(spring, push), assemblies=(assembly,))
+    run = simulate_motion(free, 1.0, samples=5, options=FINE)
+    v, q = run.solution.v, run.solution.q
+    assert_allclose(v[:, [0, 1]] + v[:, [3, 4]], 0.0, rtol=0, atol=1e-9)
+    about = sum(0.02 * v[:, k + 2] + MASS * (q[:, k] * v[:, k + 1] - q[:, k + 1] * v[:, k]) for k in (0, 3))
+    assert_allclose(about, 0.0, rtol=0, atol=1e-7)
+    assert np.max(np.abs(v)) > 1.0
+    assert run.solution.energy_balance_max < 1e-5
+    # Results have the load at its point.
+    data = pf.motion_dataset(run)
+    assert_allclose(data["load_force"].sel(load="push", axis="x"), data["point_position"].sel(point="two.A", axis="x"))
 
 
 def test_a_law_in_time_and_a_table_over_the_travel_are_what_they_say():
@@ -167,6 +212,9 @@ point = "ram.B"
 over = "1000 * guide.travel"
 table = [[0, 0], [10, 2], [20, 5]]
 interpolation = "linear"
+[linear_spring.bumper]
+points = ["ground.O", "ram.T-1"]
+force = "k * (bumper.length - 30 mm) + 2 N s/m * bumper.length_rate"
 [study]
 duration = 0.1
 """
@@ -181,6 +229,7 @@ def test_files_hold_laws(tmp_path):
     (force, vertical), torque = model.mechanism.loads[0].force, model.mechanism.loads[1].torque
     assert (force.parameters, vertical.parameters, torque.table.values) == ({"k": 4e4}, {}, (0.0, 2.0, 5.0))
     assert torque.text == "1000 * guide.travel"
+    assert model.mechanism.linear_springs[0].force.parameters == {"k": 4e4}
     model.save(tmp_path / "again.toml")
     assert pf.load(tmp_path / "again.toml").mechanism == model.mechanism
     system = build_system(model.mechanism)
@@ -204,6 +253,11 @@ def test_files_hold_laws(tmp_path):
         ('over = "1000 * guide.travel"', 'over = "2 * t"', "load.stroke.over: contains no joint and no point"),
         ("table = [[0, 0], [10, 2], [20, 5]]", "torque = 3", "load.stroke.over: is for tables only"),
         ("[10, 2], [20, 5]", "[20, 2], [10, 5]", "ascend"),
+        ("2 N s/m * bumper.length_rate", "t * 1 N/s", "linear_spring.bumper.force: contains the time"),
+        ("bumper.length_rate", "bumber.length_rate", "linear_spring.bumper.force: unknown spring between points"),
+        ("bumper.length_rate", "bumper.rate", "linear_spring.bumper.force: unknown joint"),
+        ('force = "k * (', 'length = 2 # "', "linear_spring.bumper: gives no force"),
+        ('point = "ram.B"\nover', 'point = "ram.B"\nreaction = "ram.Q"\nover', "unknown point"),
     ],
 )
 def test_mistakes_are_named(old, new, says):

@@ -74,7 +74,10 @@ def with_laws(mechanism):
     )
     torque = law("-O.rate * acos(tanh(crank.P.vx)) + 2**sinh(tanh(O.angle)) + cosh(tan(0.2 * sin(crank.M.x)))")
     loads = [PointForce(f"on_{at[:3]}", PointRef.parse(at), force) for at, force in forces]
-    return replace(mechanism, loads=(*loads, AppliedTorque("turn", PointRef.parse("crank.P"), torque)))
+    twist = AppliedTorque("turn", PointRef.parse("crank.P"), torque, reaction=PointRef.parse("rod.R"))
+    pull = law("5 * cord.length**2 - cord.length_rate * O.rate")
+    cord = LinearSpring("cord", PointRef.parse("block.S"), PointRef.parse("rod.W"), 3.0, 0.1, 0.2, force=pull)
+    return replace(mechanism, loads=(*loads, twist), linear_springs=(cord,))
 
 
 def mechanism(name):

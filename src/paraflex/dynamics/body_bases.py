@@ -75,7 +75,7 @@ def _acting(mechanism: Mechanism, constraints: Sequence[Constraint]) -> Iterator
             if not joint.slides or ref is joint.a:
                 yield ref, slope_rows
     for load in mechanism.loads:
-        yield load.point, slope_rows if isinstance(load, AppliedTorque) else place_rows
+        yield from ((point, slope_rows if isinstance(load, AppliedTorque) else place_rows) for point in load.points)
     for spring in mechanism.linear_springs:
         yield from ((spring.a, place_rows), (spring.b, place_rows))
     for body in mechanism.bodies:

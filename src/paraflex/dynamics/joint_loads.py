@@ -17,6 +17,7 @@ from .constraints import RowTerm, Term
 from .coordinates import transverse_pieces, transverse_rows
 from .following import driven_rows
 from .joint_coordinates import axis_angle, line_direction, unit_vectors
+from .load_values import line_laws
 from .points import cross, marker_place, point_motion
 from .rank import NO_PART, dependence
 from .system import System
@@ -194,7 +195,7 @@ def frame_load(system: System, places: Array, loads: Loads, q: Array, v: Array) 
         sign = float(joint.b.on_ground) - float(joint.a.on_ground)
         force += sign * loads.force[:, i]
         moment += sign * (loads.moment[:, i] + cross(places[:, i], loads.force[:, i]))
-    for spring in mechanism.linear_springs:
+    for k, spring in enumerate(mechanism.linear_springs):
         if spring.a.on_ground or spring.b.on_ground:
             fixed, moving = (spring.a, spring.b) if spring.a.on_ground else (spring.b, spring.a)
             at, there = np.array(mechanism.ground[fixed.point]), point_motion(system, moving, q, v, np.zeros_like(v))
@@ -202,7 +203,10 @@ def frame_load(system: System, places: Array, loads: Loads, q: Array, v: Array) 
             distance = np.linalg.norm(line, axis=1)
             along = line / np.where(distance > 0.0, distance, 1.0)[:, None]
             rate = np.sum(along * there.velocity, axis=1)
-            pull = (spring.stiffness * (distance - spring.length) + spring.damping * rate)[:, None] * along
+            tension = spring.stiffness * (distance - spring.length) + spring.damping * rate
+            if spring.force is not None:
+                tension = tension + line_laws(system, q, v)[:, k]
+            pull = tension[:, None] * along
             force += pull
             moment += cross(np.broadcast_to(at, pull.shape), pull)
     return Loads(force, moment)

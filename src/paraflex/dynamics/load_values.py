@@ -3,7 +3,8 @@
 import numpy as np
 
 from paraflex.arrays import Array
-from paraflex.kernel.loads import loads_along
+from paraflex.errors import InputError
+from paraflex.kernel.loads import lines_along, loads_along
 from paraflex.kernel.packed import make_scratch
 from .signals import acting_loads
 from .system import System
@@ -15,6 +16,33 @@ def load_values(system: System, t: Array, q: Array, v: Array) -> Array:
     acting, registers = acting_loads(system.mechanism, t), make_scratch(system.packed).registers
     loads_along(system.packed, np.ascontiguousarray(q), np.ascontiguousarray(v), acting, registers, found)
     return found
+
+
+def line_laws(system: System, q: Array, v: Array) -> Array:
+    """Return the forces (k, springs) of the characteristics of springs between points [N], zero without one."""
+    found = np.zeros((len(q), len(system.mechanism.linear_springs)))
+    registers = make_scratch(system.packed).registers
+    lines_along(system.packed, np.ascontiguousarray(q), np.ascontiguousarray(v), registers, found)
+    return found
+
+
+def check_laws(system: System, time: float, q: Array, v: Array) -> None:
+    """Check that the laws of all loads are finite in a state (n,).
+
+    Raises
+    ------
+    InputError
+        One of them is not.
+    """
+    if not system.packed.laws.size:
+        return
+    found = load_values(system, np.array([time]), q[None], v[None])[0]
+    named = [(f"load.{load.name}.{load.kind}", load.laws) for load in system.mechanism.loads]
+    named += [(f"linear_spring.{one.name}.force", one.laws) for one in system.mechanism.linear_springs]
+    for (field, laws), values in zip(named, [*found, *line_laws(system, q[None], v[None])[0]], strict=True):
+        if not np.isfinite(values).all():
+            problem, remedy = f"not a finite number at t = {time:g} s", "begin in another pose, or write a finite law"
+            raise InputError(problem, field=field, value=", ".join(map(str, laws)), remedy=remedy)
 
 
 def largest_loads(system: System, t: Array, q: Array, v: Array) -> list[float]:

@@ -86,4 +86,4 @@ def _moments(mechanism: Mechanism) -> Iterator[tuple[PointRef, str]]:
                 yield point, cause
     for load in mechanism.loads:
         if isinstance(load, AppliedTorque):
-            yield load.point, f"the load {load.name}"
+            yield from ((point, f"the load {load.name}") for point in load.points)

@@ -63,9 +63,10 @@ def pack_system(placed: PlacedBodies, constraints: list[Constraint]) -> tuple[Pa
         packer.add_motor(mechanism.joint(motor.joint), k)
     lines = [
         packer.end(spring.a, "a") | packer.end(spring.b, "b") | {name: getattr(spring, name) for name in _OF_SPRINGS}
+        | {"law": -1 if spring.force is None else packer.add_law(spring.force)}
         for spring in mechanism.linear_springs
-    ]
-    loads, laws, curves = _load_records(mechanism, packer)
+    ]  # fmt: skip
+    loads, curves = _load_records(mechanism, packer), packer.curves
     markers, columns = packer.markers, _columns(bodies, packer.markers)
     tracks, breaks, coefficients = _tracks([bodies[i] for i in packer.tracks])
     kinds = [_kinds(body) for body in bodies]
@@ -80,7 +81,7 @@ def pack_system(placed: PlacedBodies, constraints: list[Constraint]) -> tuple[Pa
         ports=_port_records(packer.ports),
         motor_sides=records(MOTOR_SIDE, [side for group in packer.motor_sides for side in group]),
         loads=records(LOAD, loads),
-        laws=records(LAW, laws),
+        laws=records(LAW, packer.laws),
         operations=records(OPERATION, packer.operations),
         quantities=records(QUANTITY_RECORD, packer.quantities),
         curve_start=np.cumsum([0, *(curve.breaks.size for curve in curves)]),
@@ -127,6 +128,8 @@ class _Packer:
         self.ports: list[list[dict]] = [[] for _ in placed.bodies]
         self.motor_sides: list[list[dict]] = [[] for _ in placed.bodies]
         self.axes: list[dict] = []
+        self.laws: list[dict] = []
+        self.curves: list[InputSignals] = []
         self.operations: list[dict] = []
         self.quantities: list[dict] = []
         self.tracks: list[int] = []
@@ -196,8 +199,8 @@ class _Packer:
         self.axes.append(ends | {"row": row, "weight": term.weight, "signal": signal, "track": track})
         return len(self.axes) - 1
 
-    def add_law(self, law: ForceLaw, clock: int, curve: int) -> dict[str, int]:
-        """Add the operations of a law and return its record; `clock` is the signal of the time, `curve` its table."""
+    def add_law(self, law: ForceLaw, clock: int = -1) -> int:
+        """Add a law with its operations and table, and return its number; `clock` is the signal of the time."""
         first = len(self.operations)
         for each in law.operations:
             a = each.a
@@ -206,16 +209,21 @@ class _Packer:
             record = {"code": _CODES[each.name], "a": clock if each.name == TIME else a, "b": each.b}
             self.operations.append(record | {"number": each.number})
         if law.table is not None:
-            self.operations.append({"code": TABLE, "a": len(law.operations) - 1, "b": curve})
-        return {"first": first, "end": len(self.operations)}
+            self.operations.append({"code": TABLE, "a": len(law.operations) - 1, "b": len(self.curves)})
+            self.curves.append(table_curve(law.table))
+        self.laws.append({"first": first, "end": len(self.operations)})
+        return len(self.laws) - 1
 
     def add_quantity(self, quantity: MotionQuantity) -> int:
         if quantity.point is not None:
             ends, kind = {"a": -1} | self.end(quantity.point, "b"), OF_COORDINATE
+        elif quantity.spring:
+            (spring,) = (one for one in self.placed.mechanism.linear_springs if one.name == quantity.spring)
+            ends, kind = self.end(spring.a, "a") | self.end(spring.b, "b") | {"between": 1}, OF_AXIS
         else:
             term = coordinate(self.placed.mechanism.joint(quantity.joint))
             ends, kind = self.ends(term), OF_AXIS if term.kind == AXIS else OF_ANGLE
-        axis, rate = int(quantity.word.endswith("y")), int(quantity.word in ("rate", "vx", "vy"))
+        axis, rate = int(quantity.word.endswith("y")), int(quantity.word in ("rate", "length_rate", "vx", "vy"))
         self.quantities.append(ends | {"kind": kind, "axis": axis, "rate": rate})
         return len(self.quantities) - 1
 
@@ -240,29 +248,29 @@ def _tracks(bodies: list[BodyCoordinates]) -> tuple[list[dict], Array, Array]:
     return records, breaks, coefficients
 
 
-def _load_records(
-    mechanism: Mechanism, packer: _Packer
-) -> tuple[list[dict[str, float]], list[dict[str, int]], list[InputSignals]]:
-    """Return records of loads, their laws over the motion, and the tables of these.
+def _load_records(mechanism: Mechanism, packer: _Packer) -> list[dict[str, float]]:
+    """Return records of loads, then of their reactions.
 
     Constant components are numbers, profiles in time the numbers of signals, laws -2 less their numbers.
     """
-    signals, found, laws, curves = iter(inputs_of(mechanism).loads), [], list[dict[str, int]](), list[InputSignals]()
+    signals, found = iter(inputs_of(mechanism).loads), []
     for load in mechanism.loads:
-        record: dict[str, float] = dict.fromkeys(("x_signal", "y_signal", "torque_signal"), -1)
+        record: dict[str, float] = dict.fromkeys(("x_signal", "y_signal", "torque_signal"), -1) | {"sign": 1.0}
         record["marker"] = packer.add_marker(load.point)
         names = (("fx", "x_signal"), ("fy", "y_signal")) if load.kind == "force" else (("torque", "torque_signal"),)
         for (number, signal), given in zip(names, load.components, strict=True):
             if isinstance(given, ForceLaw):
-                record[signal] = -2 - len(laws)
-                laws.append(packer.add_law(given, next(signals) if given.in_time else -1, len(curves)))
-                curves += [] if given.table is None else [table_curve(given.table)]
+                record[signal] = -2 - packer.add_law(given, next(signals) if given.in_time else -1)
             elif isinstance(given, TimeProfile):
                 record[signal] = next(signals)
             else:
                 record[number] = given
         found.append(record)
-    return found, laws, curves
+    reactions = [
+        record | {"marker": packer.add_marker(load.reaction), "sign": -1.0}
+        for load, record in zip(mechanism.loads, found, strict=True) if load.reaction is not None
+    ]  # fmt: skip
+    return [*found, *reactions]
 
 
 def _modal_rows(body: BodyCoordinates) -> Array:

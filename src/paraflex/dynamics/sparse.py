@@ -176,7 +176,8 @@ def bodies_acted_on(system: System) -> list[set[int]]:
     """
     index, mechanism = system.index, system.mechanism
     groups = [(spring.a, spring.b) for spring in mechanism.linear_springs]
-    groups += [(load.point, *mechanism.points_of(law)) for load in mechanism.loads for law in load.laws]
+    groups += [(one.a, one.b, *mechanism.points_of(law)) for one in mechanism.linear_springs for law in one.laws]
+    groups += [(*load.points, *mechanism.points_of(law)) for load in mechanism.loads for law in load.laws]
     return neighbours(system, [[index[ref.body] for ref in group if not ref.on_ground] for group in groups])
 
 

@@ -20,10 +20,12 @@ import scipy
 from scipy.sparse import csr_matrix
 
 from paraflex.arrays import Array, Indices
+from paraflex.errors import InputError
 from paraflex.kernel.packed import FRICTION, INDEX_1, SPRING
 from paraflex.kernel.tangent import make_tangent, note_slopes
 from paraflex.kernel.tangent_columns import ACCELERATION, COORDINATE, VELOCITY, tangent_columns
 from .inputs import inputs_of
+from .load_values import check_laws
 from .sparse import apart_colours, bodies_acted_on, tied_bodies
 from .system import System
 
@@ -214,6 +216,12 @@ class Tangency:
             system.packed, weights, part, self._colours, point.q, point.v, point.a, point.multipliers, point.torques,
             compliance, direction, forces, rows,
         )  # fmt: skip
+        if system.packed.laws.size and not np.isfinite(forces).all():
+            check_laws(system, point.time, point.q, point.v)
+            members = (*system.mechanism.loads, *system.mechanism.linear_springs)
+            laws = [str(law) for one in members for law in one.laws]
+            raise InputError("a law has no finite derivative here", field="load", value=", ".join(laws),
+                             remedy="begin in another pose, or write laws that are smooth here")  # fmt: skip
         return self._force_pattern.matrix(forces), self._row_pattern.matrix(rows)
 
     def _strengths(self, point: MotionPoint) -> Array:

@@ -41,6 +41,7 @@ from paraflex.mechanism import (
     Deflection,
     EndEffector,
     FlexibleBeam,
+    ForceLaw,
     LumpedMass,
     Material,
     Mechanism,
@@ -220,7 +221,7 @@ Yes = Annotated[bool, Field(strict=True)]
 # Schema type of a field by the type annotation of a member's class.
 _WRITTEN: dict[Any, Any] = {
     float: Number, int: Count, str: Text, bool: Yes, PointRef: Text, tuple[float, float]: Pair, NoneType: NoneType,
-    Mapping[str, float]: dict[Text, Number],
+    Mapping[str, float]: dict[Text, Number], ForceLaw: FunctionOfMotion,
 }  # fmt: skip
 
 

@@ -120,7 +120,8 @@ def _member(member: Any) -> dict[str, Any]:
     pairs = {key: [getattr(member, name) for name in names] for key, names in together.items() if names}
     if isinstance(member, PointForce | AppliedTorque):
         with within(f"load.{member.name}"):
-            return {"point": member.point} | components_table(member.components, member.kind)
+            reaction = {} if member.reaction is None else {"reaction": member.reaction}
+            return {"point": member.point} | reaction | components_table(member.components, member.kind)
     return pairs | changed_fields(member, "name", *(name for names in together.values() for name in names))
 
 
@@ -131,6 +132,8 @@ def _profiles(model: Any) -> Iterator[tuple[str, TimeProfile | ForceLaw]]:
     yield from (
         (f"load.{one.name}.{one.kind}", each) for one in model.mechanism.loads for each in (*one.profiles, *one.laws)
     )
+    springs = model.mechanism.linear_springs
+    yield from ((f"linear_spring.{one.name}.force", law) for one in springs for law in one.laws)
     yield from (
         (f"study.torques.{name}", profile) for name, profile in torques.items() if isinstance(profile, TimeProfile)
     )
@@ -146,7 +149,7 @@ def _plain(value: Any, field: str) -> Any:
         return value.value
     if isinstance(value, bool):
         return value
-    if isinstance(value, str | PointRef):
+    if isinstance(value, str | PointRef | ForceLaw):
         return _text(str(value), field)
     if isinstance(value, Mapping):
         return {_text(str(key), field): _plain(each, f"{field}.{key}") for key, each in value.items()}

@@ -12,6 +12,7 @@ from numpy.polynomial.polynomial import polyder, polyval
 
 from paraflex.arrays import Array, Mask
 from paraflex.dynamics import Inputs, State, System, inputs_of
+from paraflex.dynamics.load_values import check_laws
 from paraflex.errors import InputError
 from paraflex.kernel.arrays import allocated
 from paraflex.kernel.packed import Signals
@@ -175,11 +176,12 @@ def make_problem(
     Raises
     ------
     InputError
-        Times do not ascend from the start.
+        Times do not ascend from the start, or the law of a load is not finite there.
     """
     times = np.ascontiguousarray(times, dtype=float)
     if times.size == 0 or np.any(np.diff(times) <= 0.0) or times[0] < initial.time or times[-1] <= initial.time:
         raise InputError("times must ascend from the start", field="times", remedy="give at least one later time")
+    check_laws(system, initial.time, initial.q, initial.v)
     inner = np.array([] if knots is None else knots, dtype=float)
     inner = np.unique(inner[(inner > initial.time) & (inner < times[-1])])
     inputs = inputs_of(system.mechanism)

@@ -8,8 +8,8 @@ from math import cos, sin
 
 from .bending import second_order_energy, second_order_equations, second_order_shortening
 from .compiling import inlined, kernel
-from .joints import apply_lines, line_energy, spring_energy
-from .loads import apply_loads
+from .joints import line_energy, spring_energy
+from .loads import apply_lines, apply_loads
 from .packed import DAMPING, OMEGA2, S2X, S2Y
 from .sums import GJ_SUM, I1_SUM, S2X_SUM, S2Y_SUM, body_products, body_sums, clear_shares, hand_on
 from .vectors import LANES, add_scaled, load, store, zeros
@@ -105,7 +105,7 @@ def motion_forces(system, q, v, a, torques, f, scratch):
         for i in range(system.bodies.size):
             body_terms(system, i, q[k], v[k], a[k], f[k], scratch)
         apply_loads(system, q[k], v[k], torques[k], scratch.registers, f[k])
-        apply_lines(system, q[k], v[k], f[k])
+        apply_lines(system, q[k], v[k], torques[k], scratch.registers, f[k])
 
 
 @kernel

@@ -247,23 +247,6 @@ def line_state(system, k, q, v):
 
 
 @routine
-def apply_lines(system, q, v, f):
-    """Subtract the generalised forces of springs and dampers between points from f."""
-    for k in range(system.lines.size):
-        line = system.lines[k]
-        stretch, rate, ex, ey = line_state(system, k, q, v)
-        pull = line.stiffness * stretch + line.damping * rate
-        if line.a >= 0:
-            marker = system.markers[line.a]
-            _, _, _, _, _, _, rx, ry = marker_motion(system, marker, q, v, v)
-            apply_force(system, marker, q, -pull * ex, -pull * ey, rx, ry, f)
-        if line.b >= 0:
-            marker = system.markers[line.b]
-            _, _, _, _, _, _, rx, ry = marker_motion(system, marker, q, v, v)
-            apply_force(system, marker, q, pull * ex, pull * ey, rx, ry, f)
-
-
-@routine
 def line_energy(system, q, v):
     """Return the energy of the springs between points, and the power of their dampers."""
     energy, power = 0.0, 0.0

@@ -106,6 +106,7 @@ LOAD = _record(
     ("fx", np.float64),  # in the ground frame
     ("fy", np.float64),
     ("torque", np.float64),
+    ("sign", np.float64),  # 1, or -1 for the reaction to a load
     # Signals of the time-dependent components, -1 for constant ones, -2 - k for law k.
     ("x_signal", np.int64),
     ("y_signal", np.int64),
@@ -125,6 +126,7 @@ LINE = _record(
     ("stiffness", np.float64),
     ("length", np.float64),
     ("damping", np.float64),
+    ("law", np.int64),  # characteristic, -1 for none
 )
 # A law has the operations first .. end - 1, whose operands a and b are numbers of its operations. The operand a of a
 # quantity or of the time is the number of the quantity or of the signal; b of a table is that of the curve.

@@ -22,7 +22,7 @@ from .compiling import inlined, routine, unoptimised
 from .constraints import constraint_values
 from .factor import factor_bodies
 from .linear import SINGULAR_PART, orient, right_hand_side, solve_residuals, solve_system
-from .loads import apply_loads
+from .loads import apply_lines, apply_loads
 from .metric import mass_norm
 from .near import hold_rows
 from .projection import least_change
@@ -88,7 +88,7 @@ def residuals(system, signals, t, weights, q, v, a, lam, torques, work):
     apply_axes(system, q, v, a, lam, weights, torques, work.f, work.rows)
     joints.finish_friction(system, lam, work.compliance, work.rows)
     apply_loads(system, q, v, torques, work.scratch.registers, work.f)
-    joints.apply_lines(system, q, v, work.f)
+    apply_lines(system, q, v, torques, work.scratch.registers, work.f)
 
 
 @routine

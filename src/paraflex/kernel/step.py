@@ -18,7 +18,7 @@ from .factor import factor_bodies
 from .guesses import extrapolate_accelerations, guess, learn
 from .joints import line_energy, marker_angle, modal_damping_power
 from .linear import SINGULAR_PART, orient
-from .loads import load_power
+from .loads import line_power, load_power
 from .newmark import newmark_end, newmark_start
 from .packed import INDEX_1
 from .run_state import ENTERS, GGL, NO_CONVERGENCE, NOT_FINITE, PAUSED, POSITION, PROJECTION
@@ -47,11 +47,9 @@ LARGEST_GAIN = 0.3
 @routine
 def input_power(system, signals, t, q, v, lam, torques, work):
     """Return the power of the motors, of prescribed motion and of loads, less that of dampers, friction and damping."""
-    total = (
-        load_power(system, q, v, torques, work.scratch.registers)
-        + axis_power(system, q, v, torques)
-        - line_energy(system, q, v)[1]
-    )
+    registers = work.scratch.registers
+    total = load_power(system, q, v, torques, registers) + line_power(system, q, v, torques, registers)
+    total += axis_power(system, q, v, torques) - line_energy(system, q, v)[1]
     total -= dissipated_power(system, q, v, lam, work.mu) + modal_damping_power(system, v)
     for k in range(system.motor_sides.size):
         side = system.motor_sides[k]

@@ -6,19 +6,19 @@ the residuals: points of bodies, forces at them, axes, lines. The prefix `d` of 
 direction.
 """
 
-from math import cosh, sqrt
+from math import cosh
 from typing import Annotated, NamedTuple
 
 from paraflex.arrays import Array
 from .arrays import Floats, allocated, apart, fill
 from .compiling import by_reference, inlined, kernel, routine
 from .constraints import joint_rates
-from .joints import apply_torque, end_motion, marker_angles, marker_motion, row_part
-from .loads import loads_tangent
+from .joints import apply_torque, marker_angles, marker_motion, row_part
+from .loads import lines_tangent, loads_tangent
 from .packed import ANGLE, AXIS, CONSTRAINT, FRICTION, PackedSystem, sizes_of
 from .tangent_axes import axes_tangent
 from .tangent_bodies import body_terms_tangent
-from .tangent_points import end_tangent, force_tangent, marker_tangent
+from .tangent_points import force_tangent, marker_tangent
 
 
 @by_reference
@@ -62,39 +62,6 @@ def joints_tangent(system, i, weights, q, v, a, lam, direction):
             force = (weight * lam[r], weight * lam[r + 1])
             change = (weight * direction.lam[r], weight * direction.lam[r + 1])
             force_tangent(system, marker, q, force, change, (rx, ry), (d_rx, d_ry), direction)
-
-
-@routine
-def lines_tangent(system, q, v, direction):
-    """Subtract the change of the generalised forces of springs and dampers between points from direction.f."""
-    for k in range(system.lines.size):
-        line = system.lines[k]
-        ax, ay, vax, vay, _, _, rax, ray = end_motion(system, line.a, line.ax, line.ay, q, v, v)
-        bx, by, vbx, vby, _, _, rbx, rby = end_motion(system, line.b, line.bx, line.by, q, v, v)
-        dx, dy = bx - ax, by - ay
-        length = sqrt(dx * dx + dy * dy)
-        # A line of zero length has no direction, and no force in `line_state`.
-        if length == 0.0:
-            continue
-        d_ax, d_ay, d_vax, d_vay, _, _, d_rax, d_ray = end_tangent(system, line.a, q, v, v, direction)
-        d_bx, d_by, d_vbx, d_vby, _, _, d_rbx, d_rby = end_tangent(system, line.b, q, v, v, direction)
-        ex, ey, ux, uy = dx / length, dy / length, vbx - vax, vby - vay
-        d_dx, d_dy = d_bx - d_ax, d_by - d_ay
-        d_length = ex * d_dx + ey * d_dy
-        d_ex, d_ey = (d_dx - ex * d_length) / length, (d_dy - ey * d_length) / length
-        pull = line.stiffness * (length - line.length) + line.damping * (ex * ux + ey * uy)
-        d_rate = d_ex * ux + d_ey * uy + ex * (d_vbx - d_vax) + ey * (d_vby - d_vay)
-        d_pull = line.stiffness * d_length + line.damping * d_rate
-        fx, fy = pull * ex, pull * ey
-        d_fx, d_fy = d_pull * ex + pull * d_ex, d_pull * ey + pull * d_ey
-        if line.a >= 0:
-            force_tangent(
-                system, system.markers[line.a], q, (-fx, -fy), (-d_fx, -d_fy), (rax, ray), (d_rax, d_ray), direction
-            )
-        if line.b >= 0:
-            force_tangent(
-                system, system.markers[line.b], q, (fx, fy), (d_fx, d_fy), (rbx, rby), (d_rbx, d_rby), direction
-            )
 
 
 @kernel
@@ -149,7 +116,7 @@ def residual_tangent(system, weights, q, v, a, lam, torques, compliance, first, 
     axes_tangent(system, weights, q, v, a, lam, torques, direction)
     finish_rows(system, compliance, direction)
     loads_tangent(system, q, v, torques, direction)
-    lines_tangent(system, q, v, direction)
+    lines_tangent(system, q, v, torques, direction)
 
 
 @kernel

@@ -157,16 +157,20 @@ def check_loads(mechanism: Members) -> None:
     for group, members in grouped(mechanism):
         for member in members if group.kinds else ():
             _check_points_of(mechanism, group, member)
-    for load in mechanism.loads:
-        for law in load.laws:
-            for quantity in law.quantities.values():
-                _check_quantity(mechanism, quantity, f"load.{load.name}.{law.field}")
+    places = [(f"load.{load.name}", law) for load in mechanism.loads for law in load.laws]
+    places += [(f"linear_spring.{one.name}", law) for one in mechanism.linear_springs for law in one.laws]
+    for place, law in places:
+        for quantity in law.quantities.values():
+            _check_quantity(mechanism, quantity, f"{place}.{law.field}")
 
 
 def _check_quantity(mechanism: Members, quantity: MotionQuantity, field: str) -> None:
     """Check that the joint or point of a quantity exists, and that the joint has such a coordinate."""
     if quantity.point is not None:
         known_point(mechanism, quantity.point, field)
+        return
+    if quantity.spring:
+        known(quantity.spring, [one.name for one in mechanism.linear_springs], field, "spring between points")
         return
     known(quantity.joint, mechanism.joints_by_name, field, "joint")
     does: dict[str, JointThat] = {"angle": "turns", "travel": "slides", "rate": "moves"}

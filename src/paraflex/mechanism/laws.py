@@ -11,8 +11,8 @@ from paraflex.expressions.program import QUANTITY, TIME, Operation, operations_o
 from .joints import PointRef
 from .profiles import TabulatedProfile
 
-# Quantities of a joint, and of a point, by their words.
-JOINT_WORDS, POINT_WORDS = ("angle", "travel", "rate"), ("x", "y", "vx", "vy")
+# Quantities of a joint, of a spring between points, and of a point, by their words.
+JOINT_WORDS, SPRING_WORDS, POINT_WORDS = ("angle", "travel", "rate"), ("length", "length_rate"), ("x", "y", "vx", "vy")
 
 
 @dataclass(frozen=True)
@@ -22,9 +22,10 @@ class MotionQuantity:
     Attributes
     ----------
     word : str
-        "angle", "travel" or "rate" of a joint; "x", "y", "vx" or "vy" of a point in the ground frame.
-    joint : str
-        Name of the joint; empty for a point.
+        "angle", "travel" or "rate" of a joint; "length" or "length_rate" of a spring between points; "x", "y", "vx" or
+        "vy" of a point in the ground frame.
+    joint, spring : str
+        Name of the joint or of the spring; empty for others.
     point : PointRef, optional
         Point.
     """
@@ -32,6 +33,7 @@ class MotionQuantity:
     word: str
     joint: str = ""
     point: PointRef | None = None
+    spring: str = ""
 
     @classmethod
     def named(cls, name: str, field: str) -> "MotionQuantity":
@@ -44,14 +46,17 @@ class MotionQuantity:
         """
         owner, _, word = name.rpartition(".")
         body, _, point = owner.partition(".")
-        words = POINT_WORDS if point else JOINT_WORDS
+        words = POINT_WORDS if point else JOINT_WORDS + SPRING_WORDS
         if word not in words or not body or "." in point:
             of_point = f"{owner or 'body.point'} has {listed(POINT_WORDS)}"
-            of_joint = f"a joint has {listed(JOINT_WORDS)}, a point body.point has {listed(POINT_WORDS)}"
+            of_joint = f"a joint has {listed(JOINT_WORDS)}, a point body.point has {listed(POINT_WORDS)}, "
+            of_joint += f"a spring between points {listed(SPRING_WORDS)}"
             raise InputError(
                 "no quantity of a joint or point", field=field, value=name, remedy=of_point if point else of_joint
             )
-        return cls(word, "", PointRef(body, point)) if point else cls(word, body)
+        if point:
+            return cls(word, point=PointRef(body, point))
+        return cls(word, spring=body) if word in SPRING_WORDS else cls(word, body)
 
 
 @dataclass(frozen=True)
@@ -62,7 +67,8 @@ class ForceLaw(CheckedFields):
     ----------
     text : str
         Expression of parameters, of the time t, and of the quantities JOINT.angle [rad], JOINT.travel [m], JOINT.rate
-        [rad/s or m/s], BODY.POINT.x, .y [m], .vx and .vy [m/s]. Besides the functions of profiles in time it may have
+        [rad/s or m/s], BODY.POINT.x, .y [m], .vx and .vy [m/s], and of springs between points SPRING.length [m] and
+        SPRING.length_rate [m/s]. Besides the functions of profiles in time it may have
         abs(x), min(x, y) and max(x, y).
     parameters : mapping of str to float
         Values of the parameters.

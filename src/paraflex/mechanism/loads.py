@@ -8,7 +8,7 @@ import numpy as np
 
 from paraflex.arguments import CheckedFields, named_in_errors
 from paraflex.arrays import Array
-from paraflex.errors import within
+from paraflex.errors import InputError, within
 from .joints import PointRef
 from .laws import ForceLaw
 from .profiles import ConstantSpeed, TimeProfile, marks
@@ -78,7 +78,7 @@ class JointFriction(CheckedFields):
 class LinearSpring(CheckedFields):
     """Spring with a damper between two points, at most one of them on the ground.
 
-    The tensile force is stiffness (distance - length) + damping (rate of the distance). The force has no part in the
+    The tensile force is stiffness (distance - length) + damping (rate of the distance) + force. It has no part in the
     Jacobian of Newton's iteration, so very stiff springs limit the step size.
 
     Attributes
@@ -93,6 +93,8 @@ class LinearSpring(CheckedFields):
         Free length [m]; 0 by default.
     damping : float
         Damping coefficient [N s/m]; 0 by default.
+    force : ForceLaw, optional
+        Characteristic of the spring, a tensile force [N] such as "k * (NAME.length - l0)**3", without the time.
     """
 
     _table = "linear_spring"
@@ -100,9 +102,30 @@ class LinearSpring(CheckedFields):
     name: str
     a: PointRef
     b: PointRef
-    stiffness: float = field(metadata=field_metadata("the stiffness in N/m", not_negative))
+    stiffness: float = optional(0.0, "the stiffness in N/m", not_negative)
     length: float = optional(0.0, "the free length in m", not_negative)
     damping: float = optional(0.0, "the damping in N s/m", not_negative)
+    force: ForceLaw | None = optional(
+        None, "the tensile force in N, an expression of its NAME.length and NAME.length_rate, joints and points"
+    )
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        place = f"linear_spring.{self.name}"
+        if self.force is not None and self.force.in_time:
+            problem, remedy = "contains the time, on which springs do not depend", "drop t from it"
+            raise InputError(problem, field=f"{place}.force", value=self.force.text, remedy=remedy)
+        if self.force is None and not (self.stiffness or self.damping):
+            raise InputError("gives no force", field=place, remedy="give a stiffness, a damping or a force")
+
+    @property
+    def laws(self) -> tuple[ForceLaw, ...]:
+        """Its characteristic, if it has one."""
+        return () if self.force is None else (self.force,)
+
+    def moved(self, points: Mapping[PointRef, PointRef]) -> Self:
+        """Return the spring with the points of its characteristic replaced by others."""
+        return self if self.force is None else replace(self, force=self.force.moved(points))
 
 
 InTime = float | TimeProfile
@@ -145,6 +168,14 @@ class _Load(CheckedFields):
 
     name: str
     point: PointRef = field(metadata=field_metadata('"body.point"'))
+    reaction: PointRef | None = field(
+        default=None, kw_only=True, metadata=field_metadata("the point of another body that the opposite acts on")
+    )
+
+    @property
+    def points(self) -> tuple[PointRef, ...]:
+        """Points on which the load acts: its own, and that of its reaction."""
+        return (self.point,) if self.reaction is None else (self.point, self.reaction)
 
     @property
     def components(self) -> tuple[InMotion, ...]:

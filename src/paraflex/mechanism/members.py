@@ -210,10 +210,11 @@ class Members(CheckedFields):
         return used if self.end_effector is None else used | {self.end_effector.point}
 
     def points_of(self, law: ForceLaw) -> list[PointRef]:
-        """Return the points on whose motion a law depends, those of its joints included."""
-        points: list[PointRef] = []
+        """Return the points on whose motion a law depends, those of its joints and springs included."""
+        springs, points = {one.name: one for one in self.linear_springs}, list[PointRef]()
         for one in law.quantities.values():
-            points += [one.point] if one.point else [self.joint(one.joint).a, self.joint(one.joint).b]
+            between = springs[one.spring] if one.spring else self.joint(one.joint) if one.joint else None
+            points += [one.point] if one.point else [] if between is None else [between.a, between.b]
         return points
 
     @checked_arguments()

@@ -20,7 +20,7 @@ from .cut import Cut
 from .damping import stiffness_damping
 from .groups import groups_of
 from .joints import Joint, PointRef, RevoluteJoint, WeldJoint, points_named
-from .loads import AppliedTorque, PointForce, TorsionalDamper, TorsionalSpring
+from .loads import AppliedTorque, LinearSpring, PointForce, TorsionalDamper, TorsionalSpring
 from .mechanism import Mechanism
 from .members import Assembly
 from .poses import approximate_poses
@@ -139,7 +139,7 @@ def finite_segments(mechanism: Mechanism, segments: int | Mapping[str, int] = 8)
 
 def moved(member: T, points: Mapping[PointRef, PointRef]) -> T:
     """Return a member with its points replaced by the new ones, where `points` has them."""
-    member = member.moved(points) if isinstance(member, PointForce | AppliedTorque) else member
+    member = member.moved(points) if isinstance(member, PointForce | AppliedTorque | LinearSpring) else member
     return replace(member, **{field: points.get(ref, ref) for field, ref in points_named(member).items()})  # type: ignore[type-var]
 
 
