@@ -120,7 +120,7 @@ class LinearSpring(CheckedFields):
 
     @property
     def laws(self) -> tuple[ForceLaw, ...]:
-        """Its characteristic, if it has one."""
+        """Return the characteristic, if there is one."""
         return () if self.force is None else (self.force,)
 
     def moved(self, points: Mapping[PointRef, PointRef]) -> Self:
