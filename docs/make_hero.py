@@ -1,30 +1,37 @@
-"""The picture of the README: RAParM-I on its square in three modes, second-order geometry in the pinned frame.
+"""The picture of the README: RAParM-I in mode +-+- with rigid links, flexible links, and the paper's linear beams.
 
 python docs/make_hero.py
 """
 
 from __future__ import annotations
 
+import dataclasses
 from pathlib import Path
 
 import paraflex as pf
-from paraflex.fem import ReferenceCondition
-from paraflex.mechanism import Curvature
 from paraflex.plots.film import FilmOptions, animate
+from paraflex.results.record import record
 
 HERO = Path(__file__).parent / "images" / "hero.png"
-MODES = ("+-+-", "-+-+", "++++")
+MODE = "+-+-"
 
 
 def main() -> None:
-    """Run the three modes and draw them."""
+    """Run the mode with each model of the links and draw the ends of the motions along the path."""
     robot = pf.load("raparm_i")
-    task = pf.plan(robot.mechanism, robot.path("square"), duration=0.7)
-    beams = robot.mechanism.with_beams(reference=ReferenceCondition.PINNED, curvature=Curvature.SEPARATE)
-    second_order = task.remodelled(beams.with_geometry("second-order"))
+    linear = robot.mechanism
+    beams = linear.with_beams(reference="pinned", curvature="separate").with_geometry("second-order")
+    models = {"rigid links": linear.rigid(), "flexible links": beams, "the paper's linear beams": linear}
+    task = pf.plan(linear, robot.path("square"), duration=0.7)
     options = pf.IntegrationOptions(method="esdirk5", tolerance=1e-4)
-    data = pf.tracking_dataset([second_order.simulate(mode, options=options) for mode in MODES])
-    animate(data, HERO, MODES, FilmOptions(magnify=20.0, size=(1500, 500), at=0.46))
+    runs = [
+        dataclasses.replace(
+            record(task.remodelled(model).simulate(MODE, options=options, warning=False)), mode=f"{MODE}, {name}"
+        )
+        for name, model in models.items()
+    ]
+    modes = [run.mode for run in runs]
+    animate(pf.tracking_dataset(runs), HERO, modes, FilmOptions(magnify=1.0, size=(1500, 480), at=0.7))
 
 
 if __name__ == "__main__":

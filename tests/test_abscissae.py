@@ -1,5 +1,6 @@
 """Curves over a joint or a coordinate of a point in place of time, hodographs, components and paths of points."""
 
+import inspect
 from functools import cache
 
 import numpy as np
@@ -132,6 +133,13 @@ def test_what_cannot_be_an_abscissa_is_named(name, words):
         plots.energies(four_bar(), over=name)
     assert words in str(error.value)
     assert "\n" not in str(error.value)
+
+
+def test_only_figures_of_runs_are_over_something():
+    runs = "energies", "tracking_errors", "model_distances"
+    others = "bode", "force_travel", "sobol_bars", "work_precision"
+    for name in (*runs, *others):
+        assert ("over" in inspect.signature(getattr(plots, name)).parameters) == (name in runs), name
 
 
 def test_a_figure_without_curves_over_time_is_named():

@@ -8,6 +8,7 @@ import xml.etree.ElementTree as ET
 from dataclasses import replace
 from pathlib import Path
 
+import matplotlib
 import numpy as np
 import pytest
 import xarray as xr
@@ -23,6 +24,7 @@ from paraflex.integrators import IntegrationOptions
 from paraflex.motion import simulate_motion
 from paraflex.plots import film, mechanism_drawing
 from paraflex.plots.film import FilmOptions, animate, find_encoder, plan_film
+from paraflex.plots.film_pictures import frames
 from paraflex.plots.marks import block, ground_of, is_guide, moving_marks, zigzag
 from paraflex.plots.scene import ARROW, scale_bar, scene, select
 from paraflex.reports.film import animation
@@ -202,6 +204,17 @@ def test_a_film_plays_the_run_at_its_speed(data):
     np.testing.assert_allclose(film.time, np.linspace(0.0, 0.1, 11))
     # By default a round speed at which it takes five seconds or more.
     assert plan_film(data, ["++++"]).speed == pytest.approx(0.02)
+
+
+def test_pictures_of_a_film_leave_the_settings_of_matplotlib_as_they_are(data):
+    before = dict(matplotlib.rcParams)
+    pictures = frames(plan_film(data, ["++++"], FilmOptions(size=(120, 100))))
+    first, second = next(pictures), next(pictures)
+    assert dict(matplotlib.rcParams) == before
+    matplotlib.rcParams["lines.linewidth"] = before["lines.linewidth"] + 1.0
+    pictures.close()
+    assert matplotlib.rcParams["lines.linewidth"] == before["lines.linewidth"] + 1.0
+    assert np.any(first != second)
 
 
 def test_a_gif_moves_and_keeps_its_ground(data, tmp_path):

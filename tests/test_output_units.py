@@ -150,6 +150,34 @@ def test_units_of_a_file_are_those_of_its_run_and_of_what_is_made_of_its_results
     assert display_unit("m", 1.0).name == "mm"
 
 
+def test_comparisons_have_the_units_of_the_first_file_or_of_the_command(model, tmp_path):
+    out = [tmp_path / "a", tmp_path / "b"]
+    for folder, thick in zip(out, ("6 mm", "7 mm"), strict=True):
+        given = ("--set", f"section.strip.thickness={thick}", "--duration", "0.05", "--no-figures", "--no-report")
+        done = paraflex("run", model, *given, "--out", folder)
+        assert done.returncode == 0, done.stderr
+    own, chosen = (paraflex("compare", *out, *given).stdout for given in ((), ("--units", "N")))
+    assert "kN" in own
+    assert "kN" not in chosen
+
+
+def test_sweeps_have_the_units_of_the_file_of_their_mechanism(model, tmp_path):
+    study = tmp_path / "study.toml"
+    study.write_text(f'''name = "s"
+mechanism = "{model.name}"
+duration = 0.05
+samples = 11
+metrics = ["joint_force_max"]
+[vary.thickness]
+fields = ["section.strip.thickness"]
+values = ["6 mm", "7 mm"]
+''')
+    done = paraflex("sweep", study, "--output", tmp_path / "s", "--workers", "1")
+    assert done.returncode == 0, done.stderr
+    page = (tmp_path / "s" / "report.html").read_text(encoding="utf-8")
+    assert "[kN]" in page
+
+
 def test_a_model_keeps_its_units_when_it_is_saved(model, tmp_path):
     pf.load(model).save(tmp_path / "copy.toml")
     assert load_data(tmp_path / "copy.toml")[0]["units"] == load_data(model)[0]["units"]

@@ -6,13 +6,14 @@ import numpy as np
 import pytest
 import scipy.interpolate
 
+from paraflex.checks.check import profiles_cut_short
 from paraflex.dynamics import constant_signals, pack_signals
 from paraflex.errors import InputError
 from paraflex.expressions.evaluate import ExpressionError, evaluate_in_time
 from paraflex.files import load
 from paraflex.integrators import IntegrationOptions
 from paraflex.kernel.signals import evaluate_signal
-from paraflex.mechanism import ConstantSpeed, PiecewiseProfile, SpeedProfile, TabulatedProfile
+from paraflex.mechanism import ConstantSpeed, PiecewiseProfile, PrescribedAngle, SpeedProfile, TabulatedProfile
 from paraflex.mechanism.profiles import Interpolation
 from paraflex.motion import simulate_motion
 from test_spin_up import acceleration, angle, rate
@@ -354,9 +355,66 @@ def test_a_run_follows_ramps_from_its_assembly_and_files_keep_them(tmp_path):
     assert replace(swept, from_assembly=True).begun(9.0, 1.0).angle == pytest.approx(8.0, abs=1e-14)
 
 
+def test_pieces_of_speed_are_integrated_from_the_start(tmp_path):
+    rising, falling = '"w * sin(5 * pi * t / 2)"', '"w * exp(0.5 - t)"'
+    pieces = (
+        f'pieces = [{{ until = 0.2, speed = {rising} }}, {{ until = "0.5 s", speed = "w" }}, {{ speed = {falling} }}]'
+    )
+    profile = profile_of(tmp_path, f"angle = 1.0\n{pieces}")
+    t = np.array([0.0, 0.1, 0.2, 0.35, 0.5, 0.75, 1.0])
+    rising = 2.0 / (5.0 * np.pi) * (1.0 - np.cos(2.5 * np.pi * np.minimum(t, 0.2)))
+    steady, falling = np.clip(t - 0.2, 0.0, 0.3), 1.0 - np.exp(0.5 - np.maximum(t, 0.5))
+    angle, rate, acceleration = profile.evaluate(t)
+    assert angle == pytest.approx(1.0 + 5.0 * (rising + steady + falling), abs=1e-12)
+    assert rate[[1, 3, 6]] == pytest.approx([5.0 * np.sqrt(0.5), 5.0, 5.0 * np.exp(-0.5)], abs=1e-12)
+    assert acceleration[[3, 6]] == pytest.approx([0.0, -5.0 * np.exp(-0.5)], abs=1e-12)
+    assert profile.knots == (0.2, 0.5)
+
+
+def test_a_run_follows_pieces_of_speed_and_files_keep_them(tmp_path):
+    model = load(write(tmp_path, 'pieces = [{ until = 0.5, speed = "8 * t" }, { speed = 4 }]'))
+    run = simulate_motion(model, 1.0, samples=3, warning=False)
+    assert run.solution.q[:, -1] - run.solution.q[0, -1] == pytest.approx([0.0, 1.0, 3.0], abs=1e-7)
+    model.save(tmp_path / "again.toml")
+    assert load(tmp_path / "again.toml").mechanism.prescribed == model.mechanism.prescribed
+    assert [finding.code for finding in profiles_cut_short(model.mechanism, 0.4)] == ["law-cut-short"]
+
+
+def test_a_smooth_table_of_a_speed_is_not_written_as_ramps(tmp_path):
+    speed = TabulatedProfile((0.0, 0.5, 1.0), (0.0, 2.0, 1.0))
+    model = load(write(tmp_path, "speed = 3"))
+    [drive] = model.mechanism.prescribed
+    other = replace(model.mechanism, prescribed=(replace(drive, profile=SpeedProfile(0.0, speed)),))
+    with pytest.raises(InputError, match="cannot express this profile"):
+        other.save(tmp_path / "again.toml")
+
+
+def test_a_speed_of_a_motion_may_not_jump():
+    jumping = PiecewiseProfile((ConstantSpeed(1.0, 0.0), ConstantSpeed(2.0, 0.0)), (0.5,))
+    with pytest.raises(InputError, match=r"pieces: the speed jumps by 1 at t = 0.5 s .*; make the speed of the pieces"):
+        PrescribedAngle("drive", "O", SpeedProfile(0.0, jumping))
+    # The angle of successive pieces meets in value and rate, a speed in its value alone.
+    PrescribedAngle(
+        "drive", "O", SpeedProfile(0.0, PiecewiseProfile((ConstantSpeed(0.0, 2.0), ConstantSpeed(1.0, 0.0)), (0.5,)))
+    )
+
+
 @pytest.mark.parametrize(
     ("text", "says"),
     [
+        ("pieces = [{ until = 1, speed = 1 }, { speed = 2 }]", "pieces: the speed jumps by 1 at t = 1 s"),
+        ("pieces = [{ until = 1, speed = 1 }, { angle = 2 }]", "pieces.1: speeds and values are given"),
+        ("pieces = [{ until = 1, angle = 1 }, { speed = 2 }]", "pieces.0: speeds and values are given"),
+        ("pieces = [{ angle = 1, speed = 2 }]", "pieces.0: a piece needs one profile, an angle, a displacement or"),
+        ("speed = 3\npieces = [{ speed = 3 }]", "pieces: a speed is given in two ways"),
+        ('angle = "t"\npieces = [{ speed = 3 }]', "pieces: a speed can only be added to an angle"),
+        ("pieces = [{ speed = 3 }]\ntable = [[0, 1], [1, 2]]", "table: speeds and values are given"),
+        ('pieces = [{ speed = "10 mm/s" }]', "pieces.0.speed: a quantity in m/s where one in rad/s is asked for"),
+        ("pieces = [{ speed = nan }]", "pieces.0.speed: not a finite number"),
+        ("pieces = [{ until = 1, speed = true }, { speed = 1 }]", "pieces.0.speed: neither a number nor an expression"),
+        ("pieces = [{ until = -1, speed = 1 }, { speed = 1 }]", "pieces: the times of pieces must ascend from 0"),
+        ("pieces = [{ until = 1, speed = 1 }]", "pieces.0.until: every piece but the last has an end"),
+        ('pieces = [{ speed = "1 / t" }]', "pieces.0.speed: its value is not a finite number at t = 0 s"),
         ('speed = "20"\nramps = [[0, 0], [1, 1]]', "ramps: a speed is given in two ways"),
         ('angle = "t"\nspeed = "t"', "speed: a speed can only be added to an angle or displacement that is a number"),
         ('speed = "t"\npieces = [{ angle = 1 }]', "pieces: speeds and values are given"),

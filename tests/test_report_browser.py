@@ -544,15 +544,69 @@ def test_more_than_six_charts_of_a_panel_are_folded_and_drawn_once_they_are_open
     save_page(ReportPage("a", "run", panels=[Panel("Six", lines[:6]), Panel("Two more", lines)], time=time, runs=[""]),
               tmp_path / "a.html")  # fmt: skip
     page = opened(tmp_path / "a.html")
-    assert page.locator("#panels details").count() == 1
-    assert page.locator("#panels summary").inner_text() == "2 more charts: Chart 6, Chart 7"
+    more = page.locator("#panels details.more > summary")
+    assert more.count() == 1
+    assert more.inner_text() == "2 more charts: Chart 6, Chart 7"
     assert not page.locator("#chart-c7").is_visible()
-    page.locator("#panels summary").click()
+    more.click()
     assert curves(page, "c7") == [[0.0, 7.0, 1.0]]
-    page.locator("#panels summary").click()
+    more.click()
     page.evaluate("dispatchEvent(new Event('beforeprint'))")
     assert page.locator("#chart-c6").is_visible()
     page.evaluate("dispatchEvent(new Event('afterprint'))")
+    assert not page.locator("#chart-c6").is_visible()
+
+
+def test_parts_fold_by_key_and_open_by_their_links_and_for_paper(opened, report):
+    """All parts are open at first. Keys of the player do not act while the heading of a part has the focus."""
+    page = opened(report)
+    assert page.evaluate("[...document.querySelectorAll('details.part')].every((one) => one.open)")
+    modes = page.locator("#part-modes")
+    modes.locator("summary").focus()
+    page.keyboard.press("Space")
+    assert not modes.locator("table").is_visible()
+    assert not page.evaluate("report.state.playing")
+    page.locator(".contents a", has_text="Modes").click()
+    assert modes.locator("table").is_visible()
+    # A second time the address is the same.
+    modes.locator("summary").click()
+    page.locator(".contents a", has_text="Modes").click()
+    assert modes.locator("table").is_visible()
+    modes.locator("summary").click()
+    page.evaluate("dispatchEvent(new Event('beforeprint'))")
+    assert modes.locator("table").is_visible()
+    page.evaluate("dispatchEvent(new Event('afterprint'))")
+    assert not modes.locator("table").is_visible()
+
+
+def test_charts_and_animation_fit_when_they_are_unfolded(opened, report):
+    """The window has become narrower, and another mode is shown, since they were folded."""
+    page = opened(report)
+    curves(page, "errors")
+    folded = page.locator("#panels > .part").first
+    for part in (folded, page.locator("#film")):
+        part.locator("> summary").click()
+    page.set_viewport_size({"width": 700, "height": 900})
+    page.evaluate("report.set('run', 1)")
+    wait_for_drawing(page)
+    for part in (page.locator("#film"), folded):
+        part.locator("> summary").click()
+    curves(page, "errors")
+    page.wait_for_function("""() => {
+        const plot = document.querySelector("#chart-errors .js-plotly-plot");
+        return Math.abs(plot._fullLayout.width - plot.clientWidth) < 1;
+    }""")
+    page.locator("#canvas").scroll_into_view_if_needed()
+    wait_for_drawing(page)
+    ratio = page.evaluate("(({ width, clientWidth }) => width / clientWidth)(document.getElementById('canvas'))")
+    assert ratio == pytest.approx(page.evaluate("devicePixelRatio"), abs=0.01)
+    assert sum(coloured(page)) > 0
+
+
+def test_a_link_to_a_part_leads_to_it_from_elsewhere(opened, report):
+    page = opened(report)
+    page.evaluate("document.getElementById('part-integration').open = false; location.hash = '#part-integration'")
+    page.wait_for_function("document.getElementById('part-integration').open")
 
 
 def test_a_browser_that_died_is_started_again(browser, shared):

@@ -19,6 +19,7 @@ from paraflex.designs.run import Task, plan_task, run_task
 from paraflex.dynamics import State, build_system, constant_signals, numbers_of, pack_signals, same_layout
 from paraflex.errors import InputError, NumericalError
 from paraflex.fem import ModalBasis, modal_basis
+from paraflex.files import load
 from paraflex.integrators import IntegrationOptions, make_problem
 from paraflex.integrators.sensitivity import Direction, run_derivatives
 from paraflex.mechanism import Mechanism, PointRef, RevoluteJoint, RigidBody, TorsionalSpring, raparm_i
@@ -451,3 +452,16 @@ def test_command_again_and_elsewhere(tmp_path, capsys):
 def test_example_is_a_study():
     study = load_sensitivities(EXAMPLE)
     assert nominal_values(study.setting) == (0.005, 0.25, 0.225, 0.13, 70e9)
+
+
+def test_a_beam_whose_mesh_changes_with_its_length_has_no_derivative():
+    """Its point stays where it was, so that the longer beam has an element more, and the shorter one is invalid."""
+    study = {"mechanism": "raparm_i", "modes": ["++++"], "vary": {"arm": {"fields": ["link1.length"]}}}
+    with pytest.raises(InputError, match=r"vary\.arm: has no derivative: .*; vary with it what has to change too"):
+        sensitivities(study)
+
+
+def test_a_beam_of_another_mesh_is_named():
+    first, second = (load("raparm_i", set={"link1.length": length}).mechanism for length in (0.25, 0.26))
+    with pytest.raises(InputError, match=r"body\.link1: its mesh has 24 flexible coordinates instead of 12"):
+        build_system(second, build_system(first))

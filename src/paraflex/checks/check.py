@@ -21,7 +21,7 @@ from paraflex.findings import Finding, Verdict
 from paraflex.integrators import loose_tolerance
 from paraflex.mechanism import ActuationMode, Mechanism, Start, TimeProfile, standing
 from paraflex.mechanism.loads import InTime
-from paraflex.mechanism.profiles import PiecewiseProfile, TabulatedProfile, marks
+from paraflex.mechanism.profiles import PiecewiseProfile, SpeedProfile, TabulatedProfile, marks
 from paraflex.paths import Circle, Path
 from paraflex.tracking import TrackingTask
 from paraflex.units import without_quantities
@@ -264,7 +264,8 @@ def profiles_cut_short(mechanism: Mechanism, duration: float | None) -> Iterator
     """Yield prescribed motions and loads whose pieces or tables extend beyond the end of a run."""
     profiles = [(f"prescribed.{one.name}", one.profile) for one in mechanism.prescribed]
     profiles += [(f"load.{one.name}", profile) for one in mechanism.loads for profile in one.profiles[:1]]
-    for place, profile in profiles:
+    for place, whole in profiles:
+        profile = whole.speed if isinstance(whole, SpeedProfile) else whole
         if isinstance(profile, PiecewiseProfile):
             end = profile.ends[-1] if profile.ends else 0.0
         elif isinstance(profile, TabulatedProfile):

@@ -11,14 +11,16 @@ from rich.progress import TimeElapsedColumn
 
 from paraflex.campaign import OnProgress, Progress
 from paraflex.checks import check_planned
-from paraflex.compilation import compile_kernels
+from paraflex.compilation import compile_all_kernels, compile_kernels
 from paraflex.control import ControllerDescription, simulate_controlled
 from paraflex.elastodynamics import simulate_ked
 from paraflex.errors import InputError
+from paraflex.fem import ReferenceCondition
 from paraflex.files import Model
+from paraflex.files.library import errors_elsewhere
 from paraflex.folders import ResultsFolder
 from paraflex.integrators import IntegrationOptions
-from paraflex.mechanism import ActuationMode, Geometry, Mechanism, proportional_segments
+from paraflex.mechanism import ActuationMode, Curvature, Geometry, Mechanism, proportional_segments
 from paraflex.paths import Path
 from paraflex.reduced_bodies import AUTO, Reduction, reduced_task
 from paraflex.results.findings import keep_findings, verdict_of
@@ -30,7 +32,7 @@ from .commands.runs import RunRequest
 from .ending import drawing, exit_code, print_results, where, write_numbers
 from .integration import kept_coordinates, locating_reduction, run_parameters
 from .request import acting_controllers, command_provenance, controller_arguments, located_error, plan_study
-from .run_lines import failures, print_runs
+from .run_lines import failures, print_beside, print_runs
 from .stops import check_stops
 from .tables import PlainConsole, warn_of
 
@@ -62,7 +64,12 @@ def run_along(
         check_stops(mechanism, options, request.stop_at)
     controllers = acting_controllers(model, request)
     stiff = request.rigid or request.ked or request.segments is not None
-    compile_kernels(Geometry.LINEAR if stiff else mechanism.geometry, console.print)
+    elsewhere = _errors_elsewhere(request, model)
+    other = _in_other_geometry(mechanism) if elsewhere else None
+    if other is None:
+        compile_kernels(Geometry.LINEAR if stiff else mechanism.geometry, console.print)
+    else:
+        compile_all_kernels(console.print)
     began = time.perf_counter()
     planned = []
     # All paths are planned first, so that one that cannot be followed is refused before any run.
@@ -85,10 +92,25 @@ def run_along(
         method, error = own_method(request, options, controllers), model.study.error
         study = TrackingStudy(
             task, modes, options, parameters, method, error, warning=False, findings=findings, full=full,
-            reduction=reduction,
+            reduction=reduction, beside=None if other is None else task.remodelled(other), elsewhere=elsewhere,
         )  # fmt: skip
         planned.append(_Along(name, study, folder, f'path "{name}": ' if len(paths) > 1 else ""))
     return _run(request, model, planned, _model_name(request, mechanism), began)
+
+
+def _errors_elsewhere(request: RunRequest, model: Model) -> dict[str, dict[str, dict[str, float]]]:
+    """Return errors from other sources for the study of a library mechanism; empty if anything about it is changed."""
+    same = ("model", "modes", "out", "force", "drawn", "json")
+    plain = RunRequest(**{name: getattr(request, name) for name in same})
+    return errors_elsewhere(model.text) if request == plain and not model.settings else {}
+
+
+def _in_other_geometry(mechanism: Mechanism) -> Mechanism | None:
+    """Return a mechanism of linear beams with the default geometry and frames of beams; None for any other."""
+    if mechanism.geometry is not Geometry.LINEAR:
+        return None
+    frames = mechanism.with_beams(reference=ReferenceCondition.PINNED, curvature=Curvature.SEPARATE)
+    return frames.with_geometry(Geometry.SECOND_ORDER)
 
 
 def requested_tasks(
@@ -141,6 +163,8 @@ def _run(request: RunRequest, model: Model, planned: Sequence[_Along], fidelity:
                         write_numbers(result.data, plain, along.folder)
                         done[along.path], numbers[along.path] = result, plain
                         if alone:
+                            if not request.json:
+                                print_beside(PlainConsole(), result.data)
                             print_results(plain, show, as_json=request.json)
                         else:
                             warn_of(PlainConsole(stderr=request.json), verdict_of(result.data), along.whose)

@@ -11,7 +11,7 @@ from .commands.requests import flagged
 from .commands.results import CompareRequest
 from .ending import print_location, print_results
 from .replacing import hold_results
-from .tables import PlainConsole, print_table
+from .tables import PlainConsole, in_own_units, print_table
 
 
 def compare_command(request: CompareRequest) -> None:
@@ -19,6 +19,7 @@ def compare_command(request: CompareRequest) -> None:
     began = time.perf_counter()
     with flagged(request):
         found = compare(request.first, request.second, request.modes)
+    in_own_units(found.data[0])
     if request.out is not None:
         with hold_results(request.out, RUN_COMPARISON, force=request.force) as folder:
             from paraflex.plots.compare import save_overlays

@@ -3,14 +3,16 @@
 from collections.abc import Mapping
 from typing import Any
 
+import xarray as xr
+
 from paraflex.figures.controllers import controller_table
 from paraflex.figures.loads import stress_table
 from paraflex.figures.reduction import reduced_runs_table, reduced_words
-from paraflex.figures.tracking import Runs, after_table, result_table
+from paraflex.figures.tracking import Runs, after_table, beside_table, beside_words, result_table
 from paraflex.findings import DONE_STATUSES
 from paraflex.mechanism.actuation_modes import SERVO
 from paraflex.results.findings import validity_line
-from paraflex.results.following import HEADLINE, ErrorSpan, below_tolerance_line
+from paraflex.results.following import HEADLINE, ErrorSpan, below_tolerance_line, headline
 from paraflex.results.loads import effort_lines, joint_line, stress_line
 from paraflex.studies.tracking import StudyResult
 from paraflex.tracking import TrackingTask
@@ -73,6 +75,13 @@ def print_runs(
         stresses = stress_table({names: one.get("loads", {}) for names, one in runs.items()}, heads, largest=True)
         print_table(out, stresses, "Largest stress of every run")
     out.print_lines(*load_lines({name: mode.get("loads", {}) for name, mode in modes.items()}))
+
+
+def print_beside(out: PlainConsole, data: xr.Dataset) -> None:
+    """Print the tracking errors in another geometry beside those of the runs; nothing if there are none."""
+    table = beside_table(data)
+    print_table(out, table, f"{data.attrs['mechanism']}: RMS tracking error {headline(data)[1]}")
+    out.print_lines(beside_words(data))
 
 
 def below_tolerance(out: PlainConsole, summaries: Mapping[str, Any], modes: Mapping[str, Any]) -> None:

@@ -17,7 +17,7 @@ from . import signals
 from .bars import bars
 from .commands.studies import SearchRequest
 from .ending import exit_code, print_results
-from .tables import PlainConsole, print_table
+from .tables import PlainConsole, in_units_of, print_table
 
 R = TypeVar("R", OptimisationResult, IdentificationResult)
 
@@ -35,7 +35,7 @@ def identify_command(request: SearchRequest) -> int:
 def _search(request: SearchRequest, study: DesignStudy[R], report: Callable[[PlainConsole, R], None], what: str) -> int:
     """Run or continue a search, print its result and write its figures; return the exit code."""
     console = PlainConsole(stderr=True)
-    compile_kernels_for(study.base.model().mechanism, console.print)
+    compile_kernels_for(in_units_of(study.base).model().mechanism, console.print)
     result = _with_bar(console, study, request, what)
     if result.interrupted and not result.values:
         console.print("interrupted before the first design was done")

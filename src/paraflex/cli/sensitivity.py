@@ -14,7 +14,7 @@ from . import COMPLETE
 from .commands.studies import SensitivityRequest
 from .ending import print_results, write_drawn
 from .replacing import hold_results
-from .tables import PlainConsole, print_table
+from .tables import PlainConsole, in_units_of, print_table
 
 # Number of parameters side by side in a table of 80 columns.
 _PARAMETERS_ABREAST = 4
@@ -23,7 +23,7 @@ _PARAMETERS_ABREAST = 4
 def sensitivity_command(request: SensitivityRequest) -> int:
     """Differentiate the runs of a study; write sensitivity.json, the table and figures; return the exit code."""
     named = [name.strip() for entry in request.metrics for name in entry.split(",")]
-    study = load_sensitivities(request.study, [name for name in named if name])
+    study = in_units_of(load_sensitivities(request.study, [name for name in named if name]))
     folder = request.folder
     study = replace(study, at=_values(request.at, study.setting))
     with hold_results(folder, SENSITIVITY, force=request.force, field="--output") as held:

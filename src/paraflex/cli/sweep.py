@@ -14,13 +14,13 @@ from . import COMPLETE, signals
 from .bars import bars
 from .commands.studies import IndicesRequest, SweepRequest
 from .ending import exit_code, print_results
-from .tables import PlainConsole, print_table
+from .tables import PlainConsole, in_units_of, print_table
 
 
 def sweep_command(request: SweepRequest) -> int:
     """Run or continue a sweep; return the exit code."""
     console = PlainConsole(stderr=True)
-    study = load_sweep(request.study)
+    study = in_units_of(load_sweep(request.study))
     compile_kernels_for(study.model().mechanism, console.print)
     result = _sweep(console, study, request)
     verdict = study.setting.verdict()
@@ -89,6 +89,7 @@ def indices_command(request: IndicesRequest) -> int:
     """Run or continue the study and print the indices; return the exit code."""
     console = PlainConsole(stderr=True)
     study = load_indices(request.study, request.metrics, request.samples, request.seed)
+    in_units_of(study.sweep)
     compile_kernels_for(study.sweep.model().mechanism, console.print)
     with bars(console, "{task.completed}/{task.total}") as progress:
         bar = progress.add_task(study.sweep.name, total=study.sweep.runs)

@@ -33,6 +33,12 @@ def in_own_units(data: Any) -> Any:
     return data
 
 
+def in_units_of(study: Any) -> Any:
+    """Return a study, to be shown in the units of the [units] of its mechanism's file unless others are chosen."""
+    prefer_units(study.setting.data.get("units", {}))
+    return study
+
+
 class PlainConsole(Console):
     """Console that prints text as it is, without markup: square brackets hold units here.
 

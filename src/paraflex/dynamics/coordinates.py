@@ -171,6 +171,11 @@ def body_coordinates(
             integrals = integrals.without_flexibility()
         modes = modal_basis(integrals)
         if like is not None:
+            if like.vectors.shape[0] != len(modes.vectors):
+                raise InputError(
+                    f"its mesh has {len(modes.vectors)} flexible coordinates instead of {len(like.vectors)}",
+                    field=f"body.{body.name}", remedy="change its length and the point at its end together",
+                )  # fmt: skip
             modes = modes.like(like, integrals.Mff)
         integrals = integrals.in_basis(modes.vectors)
         # The inertia about the centre of mass may be rounding against that about the origin.

@@ -11,6 +11,7 @@ import xarray as xr
 
 from paraflex.errors import InputError
 from paraflex.formatting import ROUNDING, display_unit, number, peak, quantity, text_symbol
+from paraflex.results.beside import PLACES, Beside, beside_of
 from paraflex.results.controllers import controller_names
 from paraflex.results.following import headline, ranked_by_motion
 from paraflex.results.formulas import during_motion
@@ -121,6 +122,52 @@ def result_table(runs: Runs, *, brief: bool = False) -> Table:
                  {row.mode: r for r, row in enumerate(runs.rows) if row.run is not None})  # fmt: skip
 
 
+def beside_table(data: xr.Dataset) -> Table:
+    """Return the table of tracking errors in another geometry beside those of the runs; empty if there are none."""
+    beside, modes = beside_of(data), names_of(data, "mode")
+    if beside is None:
+        return Table("", ())
+    columns = [Column("mode", modes)]
+    for geometry, errors in _by_geometry(data, beside).items():
+        for name, by_mode in ({geometry.replace("-", " "): errors} | beside.elsewhere.get(geometry, {})).items():
+            columns.append(Column(name, [by_mode.get(mode) for mode in modes], "m"))
+    note = f"RMS tracking error {headline(data)[1]}."
+    return Table("Which geometry to trust", columns, note, {mode: k for k, mode in enumerate(modes)}).in_one_unit()
+
+
+def _by_geometry(data: xr.Dataset, beside: Beside) -> dict[str, dict[str, float | None]]:
+    """Return the tracking errors of runs by mode [m], by geometry: those beside the dataset's first."""
+    own: dict[str, float | None] = dict(zip(names_of(data, "mode"), map(float, headline(data)[0].values), strict=True))
+    return {beside.other: beside.errors, beside.geometry: own}
+
+
+def beside_words(data: xr.Dataset) -> str:
+    """Return sentences on which geometry to trust; empty without runs in another geometry."""
+    beside = beside_of(data)
+    if beside is None:
+        return ""
+    right, own = _by_geometry(data, beside).values()
+    if not beside.sound:
+        failed = ", ".join(mode for mode, error in right.items() if error is None)
+        return f"Runs in {beside.other} geometry {f'fail in {failed}' if failed else 'are doubtful as well'}."
+    known = beside.elsewhere.get(beside.other, {})
+    within = " and ".join(f"within {number(100.0 * (factor - 1.0), 2)} % of {source}"
+                          for source, by_mode in known.items() for factor, _ in _farthest(right, by_mode))  # fmt: skip
+    words = f"Trust {beside.other} geometry: no check gives reason for doubt"
+    words += f", and its errors are {within}." if within else "."
+    for factor, mode in _farthest(own, right):
+        words += f" {beside.geometry.capitalize()} geometry, with which all else here is computed, is off by up to a "
+        words += f"factor of {number(factor, 2)} (mode {mode})."
+    return words
+
+
+def _farthest(errors: Mapping[str, float | None], others: Mapping[str, float | None]) -> list[tuple[float, str]]:
+    """Return the largest factor between errors of the same mode, and its mode, in a list; an empty one without any."""
+    ratios = [(error / other, mode) for mode, error in errors.items() if error and (other := others.get(mode))]
+    factors = [(max(ratio, 1.0 / ratio), mode) for ratio, mode in ratios if math.isfinite(ratio)]
+    return [max(factors)] if factors else []
+
+
 def after_table(runs: Runs) -> Table:
     """Return the table of errors during the motion and after it, drift and vibration, and energy of brakes.
 
@@ -213,6 +260,7 @@ def end_effector_path(
     data = of_point(data, point)
     check_magnification(magnification)
     curves: list[Curve] = []
+    beside = beside_of(data) if point is None else None
     desired = data["end_effector_desired"].values if "end_effector_desired" in data else None
     if desired is None and magnification is not None:
         raise InputError(
@@ -226,9 +274,14 @@ def end_effector_path(
         if desired is not None:
             away, extent = actual - desired[r], float(np.ptp(desired[r], axis=0).max())
             times = round_magnification(away, extent) if magnification is None else magnification
+            magnified = f"deviation × {number(times)}"
             if times != 1.0:
                 x, y = (desired[r] + times * away).T
-                curves.append(Curve(f"deviation × {number(times)}", y, x, Look(1), run=r, shown=(r,)))
+                curves.append(Curve(magnified, y, x, Look(1), run=r, shown=(r,)))
+            if beside is not None:
+                x, y = (desired[r] + times * (data[PLACES].values[r] - desired[r])).T
+                name = f"{beside.other.replace('-', ' ')}{f', {magnified}' * (times != 1.0)}"
+                curves.append(Curve(name, y, x, Look(2), run=r, shown=(r,)))
         else:
             curves.append(start_mark(actual[:, 0], actual[:, 1], r))
     if desired is not None:

@@ -286,6 +286,9 @@ def _resolve(annotation: Any, data: Any) -> Any:
         annotation = typing.get_args(annotation)[0]
     members = [_resolve(member, data) for member in typing.get_args(annotation)]
     models = [member for member in members if is_table(member)]
+    if isinstance(data, list):
+        members = [each for each in members if typing.get_origin(each) is list and is_table(typing.get_args(each)[0])]
+        annotation = members[0] if members else annotation
     if typing.get_origin(annotation) in (dict, list) or not models:
         return annotation
     if isinstance(data, dict):

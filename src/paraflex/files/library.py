@@ -1,5 +1,6 @@
 """Library of mechanisms that come with the package."""
 
+import tomllib
 from importlib.resources import files
 from importlib.resources.abc import Traversable
 
@@ -38,3 +39,23 @@ def library_text(name: str) -> str:
         known = [*library_names(), *generator_names()]
         raise InputError("not a library mechanism", field="mechanism", value=name, remedy=suggestion(name, known))
     return library_file(name).read_text(encoding="utf-8")
+
+
+def errors_elsewhere(text: str) -> dict[str, dict[str, dict[str, float]]]:
+    """Return tracking errors by others for the unchanged file of a library mechanism.
+
+    Parameters
+    ----------
+    text : str
+        Text of a model file.
+
+    Returns
+    -------
+    dict
+        Errors by mode [m], by the name of their source and the geometry with which they compare; empty for any other
+        file.
+    """
+    for entry in (_folder() / "elsewhere").iterdir():
+        if (_folder() / entry.name).read_text(encoding="utf-8") == text:
+            return tomllib.loads(entry.read_text(encoding="utf-8"))
+    return {}

@@ -12,7 +12,7 @@ from paraflex.expressions.evaluate import check_in_time, evaluate, evaluate_in_t
 from paraflex.mechanism import ConstantSpeed, ForceLaw, PiecewiseProfile, SpeedProfile, TabulatedProfile, TimeProfile
 from paraflex.mechanism.loads import InMotion
 from paraflex.mechanism.profiles import Interpolation, Values
-from .schema import PrescribedTable
+from .schema import PieceTable, PrescribedTable
 
 # Number of times at which a profile is evaluated as a check when it is read.
 _TRIALS = 257
@@ -82,7 +82,7 @@ def read_profile(entry: PrescribedTable, parameters: Mapping[str, float], durati
         Profile given in two ways, speed together with anything but a number, pieces that do not connect, expression
         without finite derivatives, or table that is invalid or does not cover the study.
     """
-    if entry.ramps is not None or isinstance(entry.speed, str):
+    if entry.ramps is not None or isinstance(entry.speed, str) or _pieces_of_speed(entry):
         profile: TimeProfile = _speed_profile(entry, parameters)
         with renamed("ramps" if entry.ramps is not None else "speed", only="table"):
             _try(profile, duration)
@@ -107,11 +107,12 @@ def read_profile(entry: PrescribedTable, parameters: Mapping[str, float], durati
 
 
 def _speed_profile(entry: PrescribedTable, parameters: Mapping[str, float]) -> TimeProfile:
-    """Read the profile of a motion whose speed is an expression of the time, or has ramps between given values."""
+    """Read the profile of a motion whose speed is an expression of the time, or is given by ramps or pieces."""
     given = [name for name in ("speed", "ramps", "pieces", "table") if getattr(entry, name) is not None]
     if len(given) > 1:
+        speeds = ("ramps", *(["pieces"] if _pieces_of_speed(entry) else []))
         raise InputError(
-            "a speed is given in two ways" if given[1] == "ramps" else "speeds and values are given", field=given[-1],
+            "a speed is given in two ways" if given[1] in speeds else "speeds and values are given", field=given[-1],
             value=", ".join(given), remedy=f"drop all but {given[0]}",
         )  # fmt: skip
     start = _expressions(entry, parameters)[0] if _quantities(entry) else ConstantSpeed(0.0, 0.0, from_assembly=True)
@@ -124,11 +125,23 @@ def _speed_profile(entry: PrescribedTable, parameters: Mapping[str, float]) -> T
         with renamed("ramps", only="table"):
             times, speeds = zip(*entry.ramps, strict=True) if entry.ramps else ((), ())
             speed: TimeProfile = TabulatedProfile(times, speeds, Interpolation.LINEAR)
+    elif entry.pieces is not None:
+        for number, piece in enumerate(entry.pieces):
+            if piece.speed is None:
+                raise InputError(
+                    "speeds and values are given", field=f"pieces.{number}", remedy="give the speed in all pieces"
+                )
+        speed = _profiles(entry, parameters)[0]
     else:
         speed = _expression(str(entry.speed), parameters, "speed")
     if isinstance(speed, ConstantSpeed):
         return replace(start, speed=speed.angle)
     return SpeedProfile(start.angle, speed, start.from_assembly)
+
+
+def _pieces_of_speed(entry: PrescribedTable) -> bool:
+    """Check whether the speed is given in a piece of a motion."""
+    return any(piece.speed is not None for piece in entry.pieces or ())
 
 
 def _try(profile: TimeProfile, duration: float | None) -> None:
@@ -144,7 +157,10 @@ def quantities(entry: PrescribedTable) -> set[str]:
 
 def _quantities(table: Any) -> list[str]:
     """Return the quantities whose number or expression is given in a table or a piece of one."""
-    return [name for name in ("angle", "displacement", "force", "torque") if getattr(table, name, None) is not None]
+    own = ("speed",) if isinstance(table, PieceTable) else ()
+    return [
+        name for name in ("angle", "displacement", "force", "torque", *own) if getattr(table, name, None) is not None
+    ]
 
 
 def profile_table(profile: TimeProfile, quantity: str) -> dict[str, Any]:
@@ -160,9 +176,10 @@ def profile_table(profile: TimeProfile, quantity: str) -> dict[str, Any]:
         return speed if profile.from_assembly else {quantity: profile.angle} | speed
     if isinstance(profile, SpeedProfile):
         speed = components_table((profile.speed,), "speed")
-        if speed.pop("interpolation", "linear") != "linear" or "pieces" in speed:
-            raise _inexpressible_profile(profile)
-        speed = {"ramps": speed["table"]} if "table" in speed else speed
+        if "table" in speed:
+            if speed.get("interpolation") != "linear":
+                raise _inexpressible_profile(profile)
+            speed = {"ramps": speed["table"]}
         return speed if profile.from_assembly else {quantity: profile.angle} | speed
     if isinstance(profile, ConstantSpeed | ExpressionProfile) and profile.knots:
         raise _inexpressible_profile(profile)
@@ -238,9 +255,9 @@ def _expressions(table: Any, parameters: Mapping[str, float], place: str = "") -
     given = _quantities(table)
     if len(given) != 1:
         raise InputError(
-            "a piece needs one profile, an angle or a displacement",
+            "a piece needs one profile, an angle, a displacement or a speed",
             field=place,
-            remedy="give its angle, or its displacement where the joint slides",
+            remedy="give its angle, or its displacement where the joint slides, or its speed",
         )
     field, value = f"{place}.{given[0]}".strip("."), getattr(table, given[0])
     if isinstance(value, list):

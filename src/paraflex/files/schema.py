@@ -425,6 +425,7 @@ class PieceTable(_Table):
     until: Number | None = _UNTIL
     angle: FunctionOfTime | None = _optional("the angle in rad, an expression of the time t")
     displacement: FunctionOfTime | None = _optional("the displacement in m, an expression of the time t")
+    speed: FunctionOfTime | None = _optional("the speed in rad/s, in place of both, a number or an expression of t")
 
 
 class PrescribedTable(_Table):
@@ -444,7 +445,7 @@ class PrescribedTable(_Table):
         "a list of [t, speed] in s and rad/s, between which the speed changes at constant rates"
     )
     pieces: Annotated[list[PieceTable], Field(min_length=1)] | None = _optional(
-        'a list of { until = s, angle = "..." }, the last without until'
+        'a list of { until = s, angle = "..." }, or of { until = s, speed = "..." }, the last without until'
     )
     table: Rows | None = _optional(
         "a list of [t, value] in s and rad or m, or the name of a file with two such columns"

@@ -336,22 +336,33 @@ def check_motion(profile: TimeProfile) -> None:
     InputError
         The profile or its rate jumps between pieces, or it is a linear table.
     """
+    if isinstance(profile, SpeedProfile):
+        _check_pieces(profile.speed, ("speed",))
+        return
     if isinstance(profile, TabulatedProfile) and profile.linear:
         raise InputError(
             "the rate of a motion between straight lines jumps", field="interpolation", value="linear",
             remedy='give "spline", or pieces that meet in value and rate',
         )  # fmt: skip
+    for piece in profile.pieces if isinstance(profile, PiecewiseProfile) else ():
+        check_motion(piece)
+    _check_pieces(profile, ("profile", "rate"))
+
+
+def _check_pieces(profile: TimeProfile, quantities: tuple[str, ...]) -> None:
+    """Check that the pieces of a profile meet in its value, or in its value and rate, by their names in errors."""
     if not isinstance(profile, PiecewiseProfile):
         return
     for piece in profile.pieces:
-        check_motion(piece)
+        _check_pieces(piece, quantities)
     for end, (left, right) in zip(profile.ends, pairwise(profile.pieces), strict=True):
         at = np.array([end])
-        for what, a, b in zip(("profile", "rate"), left.evaluate(at), right.evaluate(at), strict=False):
+        for what, a, b in zip(quantities, left.evaluate(at), right.evaluate(at), strict=False):
             jump = float(b[0] - a[0])
             if abs(jump) > _SMOOTH * max(1.0, abs(float(a[0]))):
                 raise InputError(
                     f"the {what} jumps by {jump:.6g} at t = {end:g} s", field="pieces",
                     value=f"{float(a[0]):.9g} before, {float(b[0]):.9g} after",
-                    remedy="make value and rate of the pieces meet; t is the same time in all",
+                    remedy=f"make the {' and '.join(quantities).replace('profile', 'value')} of the pieces meet; "
+                    "t is the same time in all",
                 )  # fmt: skip

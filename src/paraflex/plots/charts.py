@@ -20,7 +20,7 @@ from paraflex.arguments import checked_arguments
 from paraflex.arrays import Array
 from paraflex.errors import InputError
 from paraflex.figures.abscissae import drawn_over
-from paraflex.figures.catalogue import all_figures
+from paraflex.figures.catalogue import all_figures, figures_of_kind
 from paraflex.figures.charts import TIME, Axis, Chart, Curve, is_logarithmic, joined, symmetrical_numbers
 from paraflex.figures.entry import Figure as CatalogueFigure, prepared
 from paraflex.figures.selection import default_mode, names_of, prototype_pair
@@ -97,6 +97,8 @@ def list_lines(panel: Axes, names: Sequence[str]) -> None:
 
 # Largest number of panels for members below one another in a figure of one column, and of those of designs.
 _MOST_BELOW, _MOST_STACKED = 12, 4
+# Kinds of results whose figures may have curves over time.
+_OF_RUNS = ("tracking", "motion", "verification")
 _MARKS = {"ring": "o", "cross": "x", "square": "s", "dot": "o", "triangle": "^", "diamond": "D"}
 # Number of marks from which they are smaller; sizes of few, of many and of faint marks, and of squares on curves [pt].
 _MANY, _SIZE, _SMALL, _FAINT, _SQUARE = 30, 4.0, 2.8, 2.4, 3.0
@@ -137,7 +139,7 @@ def plotting_function(name: str) -> Callable[..., Figure]:
     more = [inspect.Parameter(one, inspect.Parameter.POSITIONAL_OR_KEYWORD, default=None, annotation=kinds[one])
             for one in chosen]  # fmt: skip
     abscissa = inspect.Parameter("over", inspect.Parameter.KEYWORD_ONLY, default=TIME.name, annotation=str)
-    last = [abscissa] if entry.takes in ("results", "mode", "models") else []
+    last = [abscissa] if any(name in figures_of_kind(kind) for kind in _OF_RUNS) else []
     shown = inspect.Signature([own[0], *more, *own[1:], *last])
 
     def plot(*args: Any, **given: Any) -> Figure:

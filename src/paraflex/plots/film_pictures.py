@@ -74,8 +74,10 @@ def frames(film: Film, numbers: Iterable[int] | None = None) -> Iterator[NDArray
             artist.set_animated(True)
         canvas.draw()
         background = canvas.copy_from_bbox(figure.bbox)
-        for i in range(len(film.time)) if numbers is None else numbers:
-            time = film.time[i]
+    # No setting of Matplotlib is changed while a caller has a picture, or leaves the others out.
+    for i in range(len(film.time)) if numbers is None else numbers:
+        time = film.time[i]
+        with journal_style():
             canvas.restore_region(background)
             for sketch, text in zip(sketches, texts[:-1], strict=True):
                 sketch.show(i)
@@ -86,7 +88,8 @@ def frames(film: Film, numbers: Iterable[int] | None = None) -> Iterator[NDArray
                 figure.draw_artist(text)
             texts[-1].set_text(clock(time, float(film.time[-1])))
             figure.draw_artist(texts[-1])
-            yield np.array(canvas.buffer_rgba())
+            picture = np.array(canvas.buffer_rgba())
+        yield picture
 
 
 def clock(time: float, last: float) -> str:

@@ -62,6 +62,10 @@ class Page(Shown):
         Kind of results, for the browser's title.
     verdict : str
         Verdict on the results beside the title, "sound", "doubtful" or "wrong"; empty if there is none.
+    judged : str
+        Results that the verdict is about, before it; empty if it is about all of them.
+    words : str
+        Sentences about the verdict below the title; by default general ones.
     facts : sequence of (str, str)
         Names and values of the settings behind the results, at the end of the page.
     command : str
@@ -103,6 +107,8 @@ class Page(Shown):
     kind: str
     subtitle: str = ""
     verdict: str = ""
+    judged: str = ""
+    words: str = ""
     facts: Sequence[tuple[str, str]] = ()
     command: str = ""
     figures: Sequence[tuple[str, str, str]] = ()
@@ -143,11 +149,11 @@ def render(page: Page) -> str:
         kind=escape(page.kind),
         subtitle=escape(page.subtitle),
         lead=escape(_lead(page)),
-        verdict=_verdict(page.verdict),
+        verdict=_verdict(page.verdict, page.judged),
         contents=_contents(page),
         origin=_origin(page),
         figures=_figures(page.figures),
-        notes=_notes(page.notes) + _paragraphs(page.remarks, "notice remark"),
+        notes=_notes(page.notes) + paragraphs(page.remarks, "notice remark"),
         summary=_sections(page.summary),
         tables=_sections(page.tables),
         more=_sections(page.more),
@@ -301,7 +307,8 @@ def _symmetrical(axis: Axis, unit: DisplayUnit) -> dict[str, Any]:
 
 def _sections(parts: Sequence[tuple[str, str]]) -> str:
     return "".join(
-        f'<section class="card" id="{_anchor(heading)}"><h2>{escape(heading)}</h2>{html}</section>'
+        f'<details class="card part" id="{_anchor(heading)}" open><summary><h2>{escape(heading)}</h2></summary>{html}'
+        "</details>"
         for heading, html in parts
     )
 
@@ -335,7 +342,9 @@ def _lead(page: Page) -> str:
     if first is not None:
         label, value, where = first[0], first[1], first[2].partition(";")[0]
         words.append(f"{label[:1].upper()}{label[1:]}: {value}{f', {where}' if where else ''}.")
-    if page.verdict == "sound":
+    if page.words:
+        words.append(page.words)
+    elif page.verdict == "sound":
         words.append("No check gives reason for doubt.")
     elif page.verdict:
         below = f": see the notice{'s' * (len(page.notes) > 1)} below" if page.notes else ""
@@ -346,21 +355,21 @@ def _lead(page: Page) -> str:
 def _notes(notes: Sequence[str]) -> str:
     """Return the notices; many of them are folded from the second on, so that the animation stays visible."""
     if len(notes) < _FOLDED:
-        return _paragraphs(notes, "notice")
-    rest = _paragraphs(notes[1:], "notice")
-    return (
-        f"{_paragraphs(notes[:1], 'notice')}<details><summary>{len(notes) - 1} more notices</summary>{rest}</details>"
-    )
+        return paragraphs(notes, "notice")
+    rest = paragraphs(notes[1:], "notice")
+    return f"{paragraphs(notes[:1], 'notice')}<details><summary>{len(notes) - 1} more notices</summary>{rest}</details>"
 
 
-def _paragraphs(texts: Sequence[str], kind: str) -> str:
+def paragraphs(texts: Sequence[str], kind: str) -> str:
+    """Return texts as paragraphs of a class of the style sheet."""
     return "".join(f'<p class="{kind}">{escape(text)}</p>' for text in texts)
 
 
-def _verdict(word: str) -> str:
+def _verdict(word: str, judged: str) -> str:
     if not word:
         return ""
-    return f'<span class="verdict {escape(word)}"><span class="unseen">verdict: </span>{escape(word)}</span>'
+    of = f"{escape(judged)}: " if judged else ""
+    return f'<span class="verdict {escape(word)}"><span class="unseen">verdict: </span>{of}{escape(word)}</span>'
 
 
 def _figures(figures: Sequence[tuple[str, str, str]]) -> str:

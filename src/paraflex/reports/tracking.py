@@ -12,16 +12,17 @@ from paraflex.arrays import Mask
 from paraflex.figures.reduction import reduced_runs
 from paraflex.figures.run_motion import deflections_of, effort_axis
 from paraflex.figures.selection import default_mode, names_of, samples
-from paraflex.figures.tracking import Runs, after_table, result_table, solver_table
+from paraflex.figures.tracking import Runs, after_table, beside_table, beside_words, result_table, solver_table
 from paraflex.findings import DONE_STATUSES
 from paraflex.formatting import number, peak, quantity
-from paraflex.results.findings import finished, validity_line, validity_summary
+from paraflex.results.beside import Beside, beside_of
+from paraflex.results.findings import finding_lines, finished, validity_line, validity_summary, verdict_of
 from paraflex.results.following import headline
 from paraflex.results.kinds import check_kind
 from .film import NO_SHAPES, animation
 from .kind_page import kind_page
 from .loads import load_tables, load_tiles, loads_of_runs
-from .page import Page
+from .page import Page, paragraphs
 from .provenance import asked, common_facts, model_words, summary_beside, verdict_word
 from .text import sections
 
@@ -55,7 +56,7 @@ def tracking_page(data: xr.Dataset, failed: Mapping[str, str] | None = None) -> 
     # The validity is that of complete runs only.
     whole = data.isel(mode=finished(data))
     valid = validity_line({name: validity_summary(whole.sel(mode=name)) for name in names_of(whole, "mode")})
-    return replace(
+    page = replace(
         page,
         kind="run",
         subtitle=", ".join([f"path “{path}”", modes] if path else [modes]),
@@ -74,6 +75,38 @@ def tracking_page(data: xr.Dataset, failed: Mapping[str, str] | None = None) -> 
         no_film=NO_SHAPES,
         notes=[*_unfinished(data, failed or {}), *page.notes],
         remarks=[valid] if valid else [],
+    )
+    return _with_beside(page, data, beside_of(data))
+
+
+def _with_beside(page: Page, data: xr.Dataset, beside: Beside | None) -> Page:
+    """Return the page with the errors in another geometry first, and the doubts about that of its runs below them."""
+    if beside is None:
+        return page
+    findings, errors = verdict_of(data), {mode: error for mode, error in beside.errors.items() if error is not None}
+    doubts = finding_lines(one for one in findings if one.code == "validity")
+    why = f"<summary>Why {beside.geometry} geometry does not hold</summary>{paragraphs(doubts, 'notice')}"
+    [(heading, table)] = sections([beside_table(data)])
+    best = min(errors, key=errors.__getitem__, default="")
+    figures = list(page.figures)
+    if best and page.verdict in ("sound", "doubtful"):
+        name, value, mode = figures[0]
+        of = f"mode {best}, {beside.other} geometry; {beside.geometry}: {value}, {mode}"
+        figures[0] = (name, quantity(errors[best], "m"), of)
+    return replace(
+        page,
+        subtitle=f"{page.subtitle}, {beside.geometry} geometry",
+        verdict=beside.verdict.level.value if page.verdict in ("sound", "doubtful") else page.verdict,
+        judged=f"{beside.other} geometry" if page.verdict in ("sound", "doubtful") else "",
+        words=beside_words(data),
+        figures=figures,
+        summary=[(heading, table + (f"<details>{why}</details>" if doubts else ""))],
+        notes=[line for line in page.notes if line not in finding_lines(findings)]
+        + finding_lines(one for one in findings if one.code != "validity")
+        + [
+            f"{beside.other} geometry: {line}"
+            for line in finding_lines(one for one in beside.verdict if one not in findings)
+        ],
     )
 
 

@@ -1,12 +1,14 @@
 """Results of runs as plain numbers: the contents of `summary.json`."""
 
 import json
+from dataclasses import asdict
 from typing import Any
 
 import numpy as np
 import xarray as xr
 
 from paraflex.arguments import checked_arguments
+from .beside import beside_of
 from .controllers import controller_figures
 from .findings import validity_summary, verdict_of
 from .following import FOLLOWING, ErrorSpan, part_run
@@ -46,6 +48,7 @@ def summary(data: xr.Dataset, failed: dict[str, str] | None = None) -> dict[str,
         peak_torque and rms_torque per motor, end_effector_final, the solver's figures, validity (None for rigid bodies)
         and `loads` (see `load_figures`); also `sensors` of mechanisms with sensors (`sensor_figures`), `reduction` of
         reduced bodies (`reduced_run_figures`), `controllers` and internal_torque_max [N m] (`controller_figures`).
+        `beside` has the tracking errors in another geometry, if the study ran it as well (`Beside`).
         `tolerance` [m] of the integration; `error`, the time span of the error that ranks the modes; `verdict`, with
         level and all findings; `after`, the state of the motors after the path; `part`, the part of the path covered by
         runs that ended before it, else None; `parameters`; `version`. Values that a run did not reach are None.
@@ -77,6 +80,7 @@ def summary(data: xr.Dataset, failed: dict[str, str] | None = None) -> dict[str,
         numbers |= sensor_figures(run) | reduced_run_figures(run) | controller_figures(run)
         modes[str(name)] = numbers
     modes |= {name: {"status": "failed", "message": reason} for name, reason in (failed or {}).items()}
+    beside = beside_of(data)
     return {
         "mechanism": data.attrs["mechanism"],
         "tolerance": data.attrs.get("tolerance"),
@@ -85,6 +89,7 @@ def summary(data: xr.Dataset, failed: dict[str, str] | None = None) -> dict[str,
         "verdict": verdict_of(data).to_dict(),
         "part": None if part is None else part.to_dict(),
         "modes": modes,
+        **({} if beside is None else {"beside": asdict(beside)}),
         "parameters": json.loads(data.attrs["parameters"]),
         "version": data.attrs["paraflex_version"],
     }

@@ -5,7 +5,7 @@ import threading
 import time
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import partial
 from typing import Any, ClassVar, Protocol
 
@@ -25,6 +25,7 @@ from paraflex.integrators import IntegrationOptions
 from paraflex.mechanism import ActuationMode
 from paraflex.reduced_bodies import Reduction, size_of
 from paraflex.results import summary, tracking_dataset
+from paraflex.results.beside import with_beside
 from paraflex.results.following import ErrorSpan
 from paraflex.results.reduced_runs import compared_with_full, with_estimate
 from paraflex.tracking import TrackingRun, TrackingTask, simulate
@@ -117,6 +118,11 @@ class TrackingStudy(WholeStudy[StudyResult], CheckedFields):
     reduction : Reduction, optional
         Reduction by which the bodies of `task` are reduced, from `planned_reduction`; its estimated deviation is stored
         with the results.
+    beside : TrackingTask, optional
+        Task with another geometry of the beams. Each mode is run with it as well, with the same tolerance by the
+        default method, and the results contain the tracking errors beside those of `task`.
+    elsewhere : mapping
+        Tracking errors from other sources shown with them, by geometry, source and mode [m].
 
     Raises
     ------
@@ -137,6 +143,8 @@ class TrackingStudy(WholeStudy[StudyResult], CheckedFields):
     full: TrackingTask | None = None
     controllers: Sequence[ControllerDescription] = ()
     reduction: Reduction | None = None
+    beside: TrackingTask | None = None
+    elsewhere: Mapping[str, Any] = field(default_factory=dict)
 
     def _prepare(self, workers: Workers | None) -> Callable[[OnProgress | None], StudyResult]:
         if self.method is not None and not callable(self.method):
@@ -157,19 +165,23 @@ class TrackingStudy(WholeStudy[StudyResult], CheckedFields):
         with ThreadPoolExecutor(workers.number or os.cpu_count()) as pool:
             futures: dict[str, Future[TrackingRun | str | None]] = {}
             whole: dict[str, Future[TrackingRun | str | None]] = {}
+            beside: dict[str, Future[TrackingRun | str | None]] = {}
             calls = Calls()
             try:
-                for task, into, watch in ((self.task, futures, on_progress), (self.full, whole, None)):
+                tasks = ((self.task, futures, on_progress), (self.full, whole, None), (self.beside, beside, None))
+                for task, into, watch in tasks:
                     for mode in chosen if task is not None else ():
                         into[mode.name] = calls.submit(pool.submit, self._mode, task, mode, stop, watch)
-                left = {*futures.values(), *whole.values()}
+                left = {*futures.values(), *whole.values(), *beside.values()}
                 while left:
                     left -= calls.done()
             except KeyboardInterrupt:
                 # Only the main thread receives Ctrl-C; runs stop at their next progress report and keep their samples.
                 stop.set()
-        outcomes, full = ({name: future.result() for name, future in each.items()} for each in (futures, whole))
-        return self._result(outcomes, full, interrupted=stop.is_set())
+        outcomes, full, other = (
+            {name: future.result() for name, future in each.items()} for each in (futures, whole, beside)
+        )
+        return self._result(outcomes, full, other, interrupted=stop.is_set())
 
     def _mode(
         self, task: TrackingTask, mode: ActuationMode, stop: threading.Event, on_progress: OnProgress | None
@@ -190,7 +202,8 @@ class TrackingStudy(WholeStudy[StudyResult], CheckedFields):
                 return self.method(task, mode, on_progress=report)
             if self.controllers:
                 return simulate_controlled(task, mode, self.controllers, options=self.options, on_progress=report)
-            return simulate(task, mode, options=self.options, on_progress=report, warning=False)
+            options = self._options_beside if task is self.beside else self.options
+            return simulate(task, mode, options=options, on_progress=report, warning=False)
         except (IntegrationError, ControllerError) as error:
             return error.partial
         except NumericalError as error:
@@ -200,11 +213,13 @@ class TrackingStudy(WholeStudy[StudyResult], CheckedFields):
         self,
         outcomes: Mapping[str, TrackingRun | str | None],
         full: Mapping[str, TrackingRun | str | None],
+        other: Mapping[str, TrackingRun | str | None],
         *,
         interrupted: bool,
     ) -> StudyResult:
-        runs, whole = (
-            [outcome for outcome in each.values() if isinstance(outcome, TrackingRun)] for each in (outcomes, full)
+        runs, whole, beside = (
+            [outcome for outcome in each.values() if isinstance(outcome, TrackingRun)]
+            for each in (outcomes, full, other)
         )
         if self.warning:
             for run in runs:
@@ -222,7 +237,15 @@ class TrackingStudy(WholeStudy[StudyResult], CheckedFields):
             sizes = [size_of(task.system, task.start) for task in (self.task, self.reduction.full)]
             energies = {run.mode.name: _largest_energy(run) for run in runs}
             data = with_estimate(data, self.reduction.deviation, energies, self.reduction.energy, *sizes)
+        if data is not None and self.beside is not None and beside:
+            geometries = self.task.mechanism.geometry.value, self.beside.mechanism.geometry.value
+            found = tracking_dataset(beside, options=self._options_beside, error=self.error)
+            data = with_beside(data, found, geometries, self.elsewhere)
         return StudyResult(data, failed, interrupted)
+
+    @property
+    def _options_beside(self) -> IntegrationOptions:
+        return IntegrationOptions(tolerance=None if self.options is None else self.options.tolerance)
 
 
 def _largest_energy(run: TrackingRun) -> float:

@@ -146,7 +146,7 @@ class Change:
                 failure = failure or error
         raise InputError(
             f"has no derivative: a nearby value fails, {failure}", field=f"vary.{self.name}", value=task.values[k],
-            remedy="leave it out",
+            remedy="vary with it what has to change too, such as the point at a beam's end, or leave it out",
         )  # fmt: skip
 
     @cached_property

@@ -271,8 +271,9 @@ const charts = (() => {
     const holders = [...page.survey.map((panel) => [panel, "survey"]), ...page.panels.map((panel) => [panel, "panels"])];
     for (const [panel, place] of holders) {
       const made = panel.charts.map(make);
-      document.getElementById(place).append(element("h2", {}, panel.title), element("div", { class: "charts" }, ...made.splice(0, MOST_OPEN)));
-      if (made.length) document.getElementById(place).append(element("details", {},
+      const part = element("details", { class: "part", open: "" }, element("summary", {}, element("h2", {}, panel.title)), element("div", { class: "charts" }, ...made.splice(0, MOST_OPEN)));
+      document.getElementById(place).append(part);
+      if (made.length) part.append(element("details", { class: "more" },
         element("summary", {}, `${made.length} more charts: ${made.map((figure) => figure.querySelector("h3").textContent).join(", ")}`), element("div", { class: "charts" }, ...made)));
     }
     const byFigure = new Map(all.map((chart) => [chart.figure, chart]));
@@ -284,6 +285,10 @@ const charts = (() => {
       }
     }, { rootMargin: "150px" });
     for (const chart of all) watch.observe(chart.figure);
+    // The window may have another width than when a part was folded.
+    addEventListener("toggle", ({ target }) => {
+      for (const { plot, figure, drawn } of all) if (target.open && drawn && target.contains(figure) && plot.offsetWidth) Plotly.Plots.resize(plot);
+    }, true);
     report.on("run", refresh);
     report.on("theme", refresh);
     report.on("over", refresh);

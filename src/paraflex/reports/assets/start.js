@@ -90,7 +90,9 @@ const begin = (() => {
     show();
     // Paper is white.
     let before = null;
-    addEventListener("beforeprint", () => { for (const one of document.querySelectorAll("details")) one.open = true; });
+    let folded = [];
+    addEventListener("beforeprint", () => { folded = [...document.querySelectorAll("details:not([open])")]; for (const one of folded) one.open = true; });
+    addEventListener("afterprint", () => { for (const one of folded) one.open = false; });
     addEventListener("beforeprint", () => { if (report.isDark()) { before = document.documentElement.dataset.theme; report.setTheme("light", false); } });
     addEventListener("afterprint", () => { if (before) { report.setTheme(before, false); before = null; } });
   }
@@ -136,6 +138,19 @@ const begin = (() => {
     }
   }
 
+  // A link to a folded part opens it.
+  function unfold(hash) {
+    const target = byId(decodeURIComponent(hash.slice(1)));
+    for (let part = target; part; part = part.parentElement) if (part.tagName === "DETAILS") part.open = true;
+    if (target && hash === location.hash) target.scrollIntoView();
+  }
+
+  function makeLinks() {
+    for (const link of document.querySelectorAll('a[href^="#"]')) link.addEventListener("click", () => unfold(link.hash));
+    addEventListener("hashchange", () => unfold(location.hash));
+    if (location.hash) unfold(location.hash);
+  }
+
   async function loadPlotly(bytes) {
     const script = element("script");
     script.textContent = new TextDecoder().decode(await bytes);
@@ -146,6 +161,7 @@ const begin = (() => {
     makeSelector();
     makeOver();
     makeTheme();
+    makeLinks();
     showScrolling();
     byId("keyed").textContent = page.selecting;
     listen();
