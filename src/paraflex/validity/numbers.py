@@ -214,7 +214,7 @@ def _profiles(mechanism: Mechanism, size: float, times: Array) -> Iterator[Findi
         except InputError:
             # A profile may be undefined beyond an earlier end of the run; otherwise the run reports the error.
             continue
-        place = f"prescribed.{one.name}"
+        place = one.place
         swing = float(np.ptp(angle)) if np.any(rate > 0.0) and np.any(rate < 0.0) else 0.0
         if abs(angle[0]) > _TURN or swing > 2.0 * _TURN:
             what = f"it swings over {swing:.4g} rad" if swing > 2.0 * _TURN else f"it starts at {angle[0]:.4g} rad"
