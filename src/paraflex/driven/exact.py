@@ -17,6 +17,7 @@ from paraflex.integrators import Solution
 from paraflex.kernel.closure import LOOPS_CLOSED
 from paraflex.mechanism import ConstantSpeed
 from paraflex.paths import RigidMotion
+from paraflex.paths.closure import PathClosure
 from paraflex.paths.loops import ClosedLoops, LoopClosure
 
 # Part of a turn or travel, on either side of a change point, over which a motion is interpolated.
@@ -189,7 +190,10 @@ class ExactMotion(Brief):
     @property
     def target(self) -> Target:
         """Function that returns the task coordinates over time."""
-        return no_target if self.rigid is None else partial(self.loops.target, self.rigid.path)  # type: ignore[attr-defined]
+        if self.rigid is None:
+            return no_target
+        assert isinstance(self.loops, PathClosure)
+        return partial(self.loops.target, self.rigid.path)
 
     @cached_property
     def mobility(self) -> Mobility:

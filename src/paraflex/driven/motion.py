@@ -13,9 +13,9 @@ from paraflex.actuation import allocate, required_effort
 from paraflex.arguments import checked_arguments, named_in_errors
 from paraflex.arrays import Array
 from paraflex.dynamics import System, build_system, dependence, joint_coordinate, reference_pose, still_signals
-from paraflex.dynamics.joint_coordinates import value_text
+from paraflex.dynamics.joint_coordinates import joint_value, value_text
 from paraflex.dynamics.stiffness import RestingForces
-from paraflex.errors import AssemblyError, InputError
+from paraflex.errors import AssemblyError, InputError, UnreachablePathError
 from paraflex.findings import Finding
 from paraflex.formatting import quantity
 from paraflex.integrators import Solution, check_times
@@ -27,12 +27,13 @@ from paraflex.mechanism import ActuationMode, Mechanism, mode_of_motors, parse_m
 from paraflex.mechanism.masses import check_masses, with_any_masses
 from paraflex.motion import MotionRun
 from paraflex.paths import ModelWithPaths, Path, PathFollower, RigidMotion, path_follower
+from paraflex.paths.closure import PathClosure
 from paraflex.paths.loops import LoopClosure
 from paraflex.validity import large_rotations, shared_loads
 from .assemblies import FoundAssembly, assemblies_of
 from .exact import Drive, ExactMotion
 from .features import KinematicFeatures, features_of
-from .ranges import Wish, chosen_drive, driven_loops, followed, freedoms_at, ranged
+from .ranges import Wish, check_determined, chosen_drive, driven_loops, followed, freedoms_at, ranged
 
 # Samples between which properties are located: of a drive, and at most for other motions.
 _FINE, _FINEST = 361, 1441
@@ -62,8 +63,8 @@ class DrivenMotion(MotionRun):
         Name of the path and of the actuation mode; empty for none.
     passed : tuple of float
         Times of change points that the motion passes [s].
-    findings : tuple of Finding
-        Findings on the assembly and on change points.
+    notes : tuple of Finding
+        Findings on the assembly, change points, and forces.
     """
 
     drive: Drive | None
@@ -73,14 +74,23 @@ class DrivenMotion(MotionRun):
     path: str = ""
     mode: str = ""
     passed: tuple[float, ...] = ()
-    findings: tuple[Finding, ...] = ()
+    notes: tuple[Finding, ...] = ()
     open_loop: ClassVar[bool] = False
-    in_time: ClassVar[bool] = True
+
+    @property
+    def in_time(self) -> bool:
+        """Whether torques change in time, as those of motors along a path do."""
+        return True
 
     @property
     def applied(self) -> Array:
         """Torques (k, motors) at the times of the solution [N m]."""
         return self.effort
+
+    @cached_property
+    def findings(self) -> tuple[Finding, ...]:
+        """Findings on the assembly, change points, and forces; the motion itself is exact."""
+        return self.notes
 
     @cached_property
     def exact(self) -> ExactMotion:
@@ -95,6 +105,7 @@ class DrivenMotion(MotionRun):
             if rigid is None:
                 (t, q, v, a), passed = followed(self.loops, times, solution.q[0], drive)
             else:
+                assert isinstance(self.loops, PathClosure)
                 rigid = PathFollower(self.loops, solution.q[0], rigid.path)(times)
                 t, q, v, a = rigid.t, rigid.q, rigid.v, rigid.a
             solution = replace(solution, t=t, q=q, v=v, a=a)
@@ -189,6 +200,7 @@ def kinematics(
     near = reference_pose(system, chosen)
     law = chosen_drive(moved, wish, freedoms, system, near)
     if law is None:
+        check_determined(moved, freedoms)
         if duration is None:
             duration = getattr(getattr(mechanism, "study", None), "duration", None)
         if duration is None:
@@ -200,9 +212,14 @@ def kinematics(
     fixed = end is not None or duration is not None
     try:
         loops, pose, law = ranged(moved, law, near, freedoms, fixed=fixed)
-    except AssemblyError:
-        if start is not None:
-            raise
+    except UnreachablePathError:
+        raise
+    except AssemblyError as error:
+        if start is not None or law.held:
+            field, value = ("start", start) if start is not None else ("held", ", ".join(law.held))
+            raise InputError(
+                error.cause.rstrip(","), field=field, value=value, remedy="give one within reach of the assembly"
+            ) from error
         # The assembly's angle of the drive is approximate: another joint's may be nearer.
         law = chosen_drive(moved, wish, freedoms, system, closed)
         assert law is not None
@@ -214,7 +231,8 @@ def kinematics(
         ))  # fmt: skip
         loops, pose, law = ranged(moved, law, closed, freedoms, fixed=fixed)
     if start is None and not law.held:
-        notes += large_rotations(system, chosen, closed)
+        kept = law.start == joint_value(system, law.joint, near)
+        notes += large_rotations(system, chosen, pose if kept else closed)
     arrays, passed = followed(loops, np.linspace(0.0, law.duration, samples), pose, law)
     if passed:
         places = ", ".join(quantity(law.at(t), law.unit, digits=6) for t in passed)
@@ -222,7 +240,7 @@ def kinematics(
             "special-pose", f"drive {law.joint}", f"assemblies meet where it is at {places}: a change point",
             "the motion continues in the assembly whose velocities are continuous",
         ))  # fmt: skip
-    return _motion(loops.mechanism, arrays, began, law, loops, passed=passed, findings=tuple(notes))
+    return _motion(loops.mechanism, arrays, began, law, loops, passed=passed, notes=tuple(notes))
 
 
 def _path(
@@ -313,8 +331,8 @@ def torques(
         remedy = "leave it out, or follow a path"
         raise InputError("has no effect without a path", field="mode", value=mode, remedy=remedy)
     solution = with_loads(motion.system, motion.solution, effort)
-    findings = (*motion.findings, *shared_loads(motion.system, solution))
-    return replace(motion, solution=solution, effort=effort, mode=name, findings=findings)
+    notes = (*motion.notes, *shared_loads(motion.system, solution))
+    return replace(motion, solution=solution, effort=effort, mode=name, notes=notes)
 
 
 def _solution(system: System, arrays: tuple[Array, ...], began: float) -> Solution:

@@ -70,6 +70,11 @@ def chosen_drive(mechanism: Mechanism, wish: Wish, freedoms: int, system: System
         motors = [motor.joint for motor in mechanism.motors if motor.joint not in wish.held] or moving
         if prescribed and not wish.of_drive:
             return None
+        if wish.held and len(wish.held) >= freedoms:
+            raise InputError(
+                "nothing moves where all degrees of freedom are held", field="held", value=", ".join(wish.held),
+                remedy="name a joint that moves without a value",
+            )  # fmt: skip
         if not moving:
             raise InputError("no joint moves", field="drive", remedy="flexures move by bending: paraflex statics")
         if prescribed or len(motors) != 1 or freedoms > 1 + len(wish.held):
@@ -148,8 +153,8 @@ def freedoms_at(mechanism: Mechanism, assembly: Assembly) -> tuple[int, Array]:
     return found.nearby_freedoms or found.freedoms, pose
 
 
-def driven_loops(mechanism: Mechanism, pose: Array, end: float, freedoms: int) -> tuple[LoopClosure, Array]:
-    """Return the closure of a mechanism moved by its prescribed motions, and the pose at their start."""
+def check_determined(mechanism: Mechanism, freedoms: int) -> None:
+    """Check that there are as many prescribed motions as degrees of freedom."""
     open_ones = freedoms - len(mechanism.prescribed)
     driven = [each.joint for each in mechanism.prescribed]
     if open_ones > 0:
@@ -165,6 +170,11 @@ def driven_loops(mechanism: Mechanism, pose: Array, end: float, freedoms: int) -
             f"{len(driven)} drives, where the mechanism has {freedoms} degree{'s' * (freedoms != 1)} of freedom",
             field="drive", value=", ".join(driven), remedy="leave a drive out, or a joint that blocks the mechanism",
         )  # fmt: skip
+
+
+def driven_loops(mechanism: Mechanism, pose: Array, end: float, freedoms: int) -> tuple[LoopClosure, Array]:
+    """Return the closure of a mechanism moved by its prescribed motions, and the pose at their start."""
+    check_determined(mechanism, freedoms)
     loops = LoopClosure(mechanism, end, None, NO_TASKS)
     return loops, assembled_position(loops.system, loops.signals, 0.0, pose)
 

@@ -17,7 +17,8 @@ from paraflex.limits import INSTANTS
 from paraflex.mechanism import Assembly, Mechanism, PointRef, with_actuators
 from .sparse_closure import RedundantClosure, SparseClosure
 
-# Number of pieces of a step that is too long, divided repeatedly down to the shortest step [s].
+# Number of pieces of a step that is too long, divided repeatedly down to the shortest step [s], or as a part of
+# a shorter motion.
 _STEP_PIECES, _SHORTEST_STEP = 16, 1e-8
 
 
@@ -102,11 +103,11 @@ class LoopClosure:
         pose : (n,) array
             Pose near the first instant.
         """
-        intervals = []
+        intervals, shortest = [], _SHORTEST_STEP * min(1.0, float(grid[-1] - grid[0]) or 1.0)
         while True:
             status, index, found = self.run(grid, target(grid), pose)
             last = index - 1
-            if status in (LOOPS_CLOSED, LOOPS_SINGULAR) or last < 0 or grid[index] - grid[last] < _SHORTEST_STEP:
+            if status in (LOOPS_CLOSED, LOOPS_SINGULAR) or last < 0 or grid[index] - grid[last] < shortest:
                 break
             # Continue from the last instant reached, in shorter steps.
             intervals.append([x[:last][keep[:last]] for x in (grid, *found)])
