@@ -74,7 +74,7 @@ def _asked(model: Model, request: KinematicsRequest) -> dict[str, Any]:
     drive, held = next(iter(moving), None), dict[str, float]()
     unit = "m" if slides.get(drive or "", False) else "rad"
     for text in request.drive:
-        joint, _, value = (part.strip() for part in text.partition("="))
+        joint, _, value = (part.strip() for part in text.rpartition("="))
         if text not in moving:
             if joint in held or not value:
                 problem = "holds a joint twice" if joint in held else "has no value"

@@ -2,7 +2,7 @@
 
 import math
 import time
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, ClassVar
@@ -196,7 +196,7 @@ def kinematics(
         follow = path_follower(moved, way, last, assembly=chosen, orientation=orientation)
         rigid = follow(np.linspace(0.0, last, samples))
         return _motion(moved, (rigid.t, rigid.q, rigid.v, rigid.a), began, None, follow.closure, rigid=rigid, path=name)
-    system, notes = build_system(replace(moved, prescribed=())), []
+    system = build_system(replace(moved, prescribed=()))
     near = reference_pose(system, chosen)
     law = chosen_drive(moved, wish, freedoms, system, near)
     if law is None:
@@ -209,38 +209,40 @@ def kinematics(
         loops, pose = driven_loops(moved, near, duration, freedoms)
         arrays, passed = followed(loops, np.linspace(0.0, duration, samples), pose)
         return _motion(moved, arrays, began, None, loops, passed=passed)
-    fixed = end is not None or duration is not None
-    try:
-        loops, pose, law = ranged(moved, law, near, freedoms, fixed=fixed)
-    except UnreachablePathError:
-        raise
-    except AssemblyError as error:
-        if start is not None or law.held:
-            field, value = ("start", start) if start is not None else ("held", ", ".join(law.held))
-            raise InputError(
-                error.cause.rstrip(","), field=field, value=value, remedy="give one within reach of the assembly"
-            ) from error
-        # The assembly's angle of the drive is approximate: another joint's may be nearer.
-        law = chosen_drive(moved, wish, freedoms, system, closed)
-        assert law is not None
-        given, there = (value_text(system, law.joint, pose) for pose in (near, closed))
-        notes.append(Finding(
-            "assembly-moved", f"assembly.{chosen.name}",
-            f"the loops do not close with {law.joint} at {given} as given, but at {there}",
-            "correct the angles of the assembly, or give the start of the drive",
-        ))  # fmt: skip
-        loops, pose, law = ranged(moved, law, closed, freedoms, fixed=fixed)
+    notes = list[Finding]()
+    loops, pose, law, moved_to = _ranged(moved, law, wish, freedoms, system, (near, closed))
+    if moved_to:
+        text = (
+            f"the loops do not close with {law.joint} at {value_text(system, law.joint, near)} as given, but {moved_to}"
+        )
+        remedy = "correct the angles of the assembly, or give the start of the drive"
+        notes.append(Finding("assembly-moved", f"assembly.{chosen.name}", text, remedy))
     if start is None and not law.held:
         kept = law.start == joint_value(system, law.joint, near)
         notes += large_rotations(system, chosen, pose if kept else closed)
     arrays, passed = followed(loops, np.linspace(0.0, law.duration, samples), pose, law)
-    if passed:
-        places = ", ".join(quantity(law.at(t), law.unit, digits=6) for t in passed)
-        notes.append(Finding(
-            "special-pose", f"drive {law.joint}", f"assemblies meet where it is at {places}: a change point",
-            "the motion continues in the assembly whose velocities are continuous",
-        ))  # fmt: skip
-    return _motion(loops.mechanism, arrays, began, law, loops, passed=passed, notes=tuple(notes))
+    return _motion(loops.mechanism, arrays, began, law, loops, passed=passed, notes=notes)
+
+
+def _ranged(
+    mechanism: Mechanism, law: Drive, wish: Wish, freedoms: int, system: System, poses: tuple[Array, Array]
+) -> tuple[LoopClosure, Array, Drive, str]:
+    """Return closure, first pose and drive from an assembly as given or, if that fails, closed; then also its value."""
+    near, closed = poses
+    fixed = wish.end is not None or wish.duration is not None
+    try:
+        return *ranged(mechanism, law, near, freedoms, fixed=fixed), ""
+    except UnreachablePathError:
+        raise
+    except AssemblyError as error:
+        if wish.start is not None or law.held:
+            field, value = ("held", ", ".join(law.held)) if wish.start is None else ("start", wish.start)
+            remedy = "give one within reach of the assembly"
+            raise InputError(error.cause.rstrip(","), field=field, value=value, remedy=remedy) from error
+    # The assembly's angle of the drive is approximate: another joint's may be nearer.
+    again = chosen_drive(mechanism, wish, freedoms, system, closed)
+    assert again is not None
+    return *ranged(mechanism, again, closed, freedoms, fixed=fixed), f"at {value_text(system, law.joint, closed)}"
 
 
 def _path(
@@ -266,11 +268,21 @@ def _path(
 
 
 def _motion(
-    mechanism: Mechanism, arrays: tuple[Array, ...], began: float, law: Drive | None, loops: LoopClosure, **more: Any
-) -> DrivenMotion:
+    mechanism: Mechanism, arrays: tuple[Array, ...], began: float, law: Drive | None, loops: LoopClosure, *,
+    passed: tuple[float, ...] = (), notes: Sequence[Finding] = (), **more: Any,
+) -> DrivenMotion:  # fmt: skip
     system, still = build_system(mechanism), {motor.name: 0.0 for motor in mechanism.motors}
     effort = np.full((arrays[0].size, len(still)), np.nan)
-    return DrivenMotion(system, arrays[0], still, _solution(system, arrays, began), law, loops, effort, **more)
+    if passed:
+        where = "drives are" if law is None else f"{law.joint} is"
+        places = (f"t = {t:.6g} s" if law is None else quantity(law.at(t), law.unit, digits=6) for t in passed)
+        text = f"assemblies meet, a change point, where {where} at {', '.join(places)}"
+        remedy = "the motion continues in the assembly whose velocities are continuous"
+        notes = [*notes, Finding("special-pose", "drive" if law is None else f"drive {law.joint}", text, remedy)]
+    solution = _solution(system, arrays, began)
+    return DrivenMotion(
+        system, arrays[0], still, solution, law, loops, effort, passed=passed, notes=tuple(notes), **more
+    )
 
 
 @checked_arguments()

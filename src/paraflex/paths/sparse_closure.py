@@ -1,5 +1,6 @@
 """Closure of large mechanisms along a path: the method of `kernel.closure` with sparse factors."""
 
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -145,24 +146,15 @@ class SparseClosure:
         a[:] = self._solve(factor, np.concatenate([-second, target[2] - self._task(q, v)[2]]))
 
 
-class _LeastSquares:
-    """Pseudoinverse of a matrix with independent columns, in place of its factors."""
-
-    def __init__(self, matrix: Array) -> None:
-        self._inverse = np.linalg.pinv(matrix)
-
-    def solve(self, right: Array) -> Array:
-        """Return the solution of least squares for right-hand sides (m,) or (m, k)."""
-        return self._inverse @ right
-
-
 class RedundantClosure(SparseClosure):
     """Loops closed by least squares, where constraints depend on one another at every pose."""
 
     def _factor(self, jacobian: scipy.sparse.csc_matrix) -> Any:
-        """Return the pseudoinverse of a Jacobian; None at a singular position."""
-        sizes = np.linalg.svd(dense := jacobian.toarray(), compute_uv=False)
-        return _LeastSquares(dense) if sizes[-1] >= kernel.SINGULAR_PIVOT * sizes[0] else None
+        """Return a solver of least squares with a Jacobian; None at a singular position."""
+        dense = jacobian.toarray()
+        sizes = np.linalg.svd(dense, compute_uv=False)
+        regular = sizes[-1] >= kernel.SINGULAR_PIVOT * sizes[0]
+        return SimpleNamespace(solve=np.linalg.pinv(dense).__matmul__) if regular else None
 
     def _relative_change(self, factor: Any, change: scipy.sparse.csc_matrix, q: Array) -> float:
         """Return the norm of the pseudoinverse of `before` times its change: below one, no position is singular."""

@@ -228,14 +228,14 @@ def _profiles(mechanism: Mechanism, size: float, times: Array) -> Iterator[Findi
 
 
 def _drives(mechanism: Mechanism) -> Iterator[Finding]:
-    driven = {one.joint: one.name for one in mechanism.prescribed}
+    driven = {one.joint: one.place for one in mechanism.prescribed}
     shared: dict[str, list[str]] = {}
     for motor in mechanism.motors:
         shared.setdefault(motor.joint, []).append(motor.name)
         if motor.joint in driven:
             yield Finding(
                 "motor-prescribed", f"motor.{motor.name}",
-                f"its joint {motor.joint} follows [prescribed.{driven[motor.joint]}] whatever the motor does",
+                f"its joint {motor.joint} follows {driven[motor.joint]} whatever the motor does",
                 "leave one of them out",
             )  # fmt: skip
     for joint, names in shared.items():
