@@ -325,6 +325,16 @@ def test_a_flywheel_absorbs_the_fluctuation_of_a_slider_crank():
         ({"end": 360.0}, "end: more than 20 turns"),
         ({"samples": 1}, "samples: too few"),
         ({"assembly": "none"}, "assembly"),
+        ({"end": 1.0, "duration": 1.0}, "duration: has no effect where the end of the drive is given"),
+        ({"duration": 500.0}, "duration: more than 20 turns"),
+        ({"duration": math.nan}, "duration"),
+        ({"drive": "crank"}, r"drive: not a joint \(got 'crank'\); name one of its joints: O, A"),
+        ({"drive": None, "held": {"O": 1.0}}, "held: nothing moves where all degrees of freedom are held"),
+        ({"held": {"O": 1.0}}, "drive: one joint both moves and is held"),
+        ({"held": {"Q": 1.0}}, "drive: 2 drives, where the mechanism has 1 degree of freedom"),
+        ({"held": {"Q": math.nan}}, "held.Q"),
+        ({"held": {"X": 1.0}}, "held: unknown joint"),
+        ({"path": "square"}, "drive: has no effect along a path"),
     ],
 )
 def test_wrong_arguments_are_named(given, message):
@@ -333,8 +343,10 @@ def test_wrong_arguments_are_named(given, message):
 
 
 def test_drives_that_do_not_determine_the_motion_are_named():
-    with pytest.raises(InputError, match="drive: 2 degrees of freedom need as many prescribed motions"):
-        pf.kinematics(pf.load("five_bar"))
+    with pytest.raises(
+        InputError, match=r"drive: is missing; name the joint that drives .*, and 1 to hold, as --drive"
+    ):
+        pf.kinematics(pf.load("five_bar").mechanism)
     with pytest.raises(InputError, match="drive: no joint moves"):
         pf.kinematics(pf.load("cross_spring_pivot"))
     with pytest.raises(InputError, match="leave 1 degree of freedom of the mechanism open"):
@@ -420,6 +432,176 @@ def test_a_flywheel_needs_enough_samples_and_a_torque_that_repeats():
         pf.flywheel(pf.torques(pushed), 0.05)
 
 
+@pytest.mark.parametrize("size", [1e-6, 1e3])
+def test_a_mechanism_of_any_size_has_the_same_angles(size):
+    lengths = np.array([0.4, 0.1, 0.35, 0.25])
+    right, found = (
+        pf.motion_dataset(pf.kinematics(four_bar(*(scale * lengths), (scale * 0.1, scale * 0.2)), "O", start=1.0))
+        for scale in (1.0, size)
+    )
+    assert float(abs(found["angle"] - right["angle"]).max()) < 1e-9
+    for name in ("point_position", "point_velocity", "point_acceleration"):
+        assert float(abs(found[name] / size - right[name]).max()) < 1e-9, name
+
+
+PARALLELOGRAM = replace(
+    four_bar(0.4, 0.1, 0.4, 0.1, (0.2, 0.1)),
+    assemblies=(pf.Assembly("open", {"crank": 0.7, "coupler": 0.0, "rocker": 0.7}),
+                pf.Assembly("crossed", {"crank": 0.7, "coupler": -0.3, "rocker": -1.2})),
+)  # fmt: skip
+
+
+@pytest.mark.parametrize(("start", "samples"), [(0.7, 361), (math.radians(60), 361), (0.7, 2), (math.radians(179), 9)])
+def test_a_parallelogram_turns_through_its_folded_poses_without_turning_its_coupler(start, samples):
+    motion = pf.kinematics(PARALLELOGRAM, "O", start=start, samples=samples)
+    turned = [motion.drive.at(t) for t in motion.passed]
+    first = math.pi * math.ceil(start / math.pi)
+    assert turned == pytest.approx([first, first + math.pi], abs=1e-6)
+    data = pf.motion_dataset(motion)
+    names = ("angle", "angular_velocity", "angular_acceleration")
+    for name, least in zip(names, (1e-11, 1e-9, 1e-6), strict=True):
+        assert float(abs(data[name].sel(body="coupler")).max()) < least, name
+        rocker, crank = (data[name].sel(body=body) for body in ("rocker", "crank"))
+        assert float(abs(rocker - crank).max()) < least, name
+    assert [one.code for one in motion.findings] == ["special-pose"]
+    assert "3.14159 rad" in motion.findings[0].text or start > 3.0
+    assert motion.features.trails["coupler.P"].crunodes == ()
+
+
+def test_a_crossed_parallelogram_stays_crossed():
+    motion = pf.kinematics(PARALLELOGRAM, "O", assembly="crossed")
+    data = pf.motion_dataset(motion)
+    turned = data["angle"].sel(body="rocker")
+    assert float(turned[0] - turned[-1]) == pytest.approx(2.0 * math.pi, abs=1e-11)
+    assert len(motion.passed) == 2
+    # Crossed, the tangents of half the angles have a constant ratio.
+    crank, rocker = (np.tan(data["angle"].sel(body=body).values / 2.0) for body in ("crank", "rocker"))
+    usual = (np.abs(crank) < 10.0) & (np.abs(crank) > 0.1)
+    assert (crank / rocker)[usual] == pytest.approx(-(0.4 - 0.1) / (0.4 + 0.1), abs=1e-9)
+
+
+def test_a_motion_that_starts_at_a_change_point_is_refused():
+    with pytest.raises(UnreachablePathError, match=r"change point or a limit of reach near O at 3\.14159 rad"):
+        pf.kinematics(PARALLELOGRAM, "O", start=math.pi)
+
+
+def bar(name, a, b, length):
+    return pf.RigidBody(
+        name, mass=1.0, inertia=length**2 / 12, points={a: (0.0, 0.0), b: (length, 0.0)},
+        centre_of_mass=(length / 2, 0.0),
+    )  # fmt: skip
+
+
+def picker(links=3):
+    """Return a pick-and-place arm of two parallelograms; a third link of each repeats a constraint."""
+    numbers = range(1, links + 1)
+    low, high = ((0.0, 0.0), (0.1, 0.0), (0.04, 0.06)), ((0.0, 0.02), (0.1, 0.02), (0.05, -0.05))
+    bodies = [
+        *(bar(f"arm{k}", "O", "A", 0.3) for k in numbers), *(bar(f"fore{k}", "C", "E", 0.25) for k in numbers),
+        pf.RigidBody("elbow", 0.5, 1e-3, points={f"{at}{k}": place[k - 1] for k in numbers
+                                                 for at, place in (("A", low), ("C", high))}),
+        pf.RigidBody("plate", 0.3, 1e-3, points={f"E{k}": high[k - 1] for k in numbers} | {"P": (0.05, -0.1)}),
+    ]  # fmt: skip
+    joints = [
+        revolute(f"{at}{k}", a, b) for k in numbers for at, a, b in (
+            ("O", f"ground.O{k}", f"arm{k}.O"), ("A", f"arm{k}.A", f"elbow.A{k}"),
+            ("C", f"elbow.C{k}", f"fore{k}.C"), ("E", f"fore{k}.E", f"plate.E{k}"),
+        )
+    ]  # fmt: skip
+    angles = {body.name: {"a": 1.2, "f": -0.4}.get(body.name[0], 0.0) for body in bodies}
+    return pf.Mechanism(
+        "picker", {f"O{k}": low[k - 1] for k in numbers}, tuple(bodies), tuple(joints),
+        motors=(pf.Motor("m1", "O1"), pf.Motor("m2", "C1")), gravity=(0.0, -9.81),
+        end_effector=pf.EndEffector(pf.PointRef("plate", "P"), ("x", "y")), assemblies=(pf.Assembly("a", angles),),
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("links", [2, 3])
+def test_links_that_repeat_a_constraint_move_as_the_others(links):
+    motion = pf.torques(picker(links), "O1", held={"C1": -1.6}, start=1.2, end=1.9)
+    data = pf.motion_dataset(motion)
+    assert motion.features.freedoms == 2
+    assert float(abs(data["angle"].sel(body=["elbow", "plate"])).max()) < 1e-12
+    arms = data["angle"].sel(body=[f"arm{k}" for k in range(1, links + 1)])
+    assert float(abs(arms - np.linspace(1.2, 1.9, 361)[:, None]).max()) < 1e-12
+    # Held against an elbow that only translates, the forearm does not turn.
+    weight = 9.81 * (links * (0.15 + 0.3) + 0.3 * (0.5 + 0.3))
+    expected = weight * np.cos(np.linspace(1.2, 1.9, 361))
+    assert data["drive_torque"].sel(drive="O1").values == pytest.approx(expected, abs=1e-9)
+    undetermined = [one.code for one in motion.findings]
+    assert undetermined == (["loads-undetermined"] if links == 3 else [])
+
+
+def test_constraints_that_contradict_elsewhere_stop_the_motion():
+    mechanism = picker()
+    longer = tuple(replace(b, points=b.points | {"O": (-0.004, 0.0)}) if b.name == "arm3" else b
+                   for b in mechanism.bodies)  # fmt: skip
+    x, y = 0.3 * math.cos(1.2), 0.3 * math.sin(1.2)
+    # The third arm is longer; its pivot lies such that loops close at the assembly only.
+    ground = mechanism.ground | {"O3": (0.04 + x - 0.304 * math.cos(1.2), 0.06 + y - 0.304 * math.sin(1.2))}
+    with pytest.raises((InputError, UnreachablePathError)):
+        pf.kinematics(replace(mechanism, bodies=longer, ground=ground), "O1", held={"C1": -1.6}, end=1.9)
+
+
+@pytest.mark.parametrize("links", [2, 3])
+def test_torques_along_a_path_are_those_that_drive_a_run(links):
+    mechanism, line = picker(links), pf.Line((0.38, 0.08), (0.3, 0.15), 4.0)
+    found = pf.torques(mechanism, path=line, samples=101)
+    run = pf.simulate(pf.plan(mechanism, line, samples=101, warning=False), "++", warning=False)
+    exact, driven = pf.motion_dataset(found), pf.tracking_dataset([run]).isel(mode=0)
+    assert found.mode == "++"
+    assert float(abs(exact["point_position"].sel(point="plate.P") - driven["end_effector_desired"]).max()) < 1e-12
+    assert float(abs(exact["applied_torque"] - driven["torque"]).max()) < 1e-9
+    for name in ("frame_force", "frame_moment", "kinetic_energy", *(["joint_force"] if links == 2 else [])):
+        assert float(abs(exact[name] - driven[name]).max()) < 1e-4 * float(abs(driven[name]).max()), name
+    assert float(abs(exact["motor_energy"] - driven["motor_energy"]).max()) < 1e-3
+
+
+def test_a_model_with_a_path_follows_it_unless_a_drive_is_named():
+    model = pf.load("five_bar")
+    motion = pf.kinematics(model, samples=51)
+    assert (motion.path, motion.drive) == ("square", None)
+    data = pf.motion_dataset(motion)
+    desired = model.path("square").evaluate(data["time"].values)
+    assert data["point_position"].sel(point="distal1.C").values == pytest.approx(desired.position, abs=1e-12)
+    assert data["point_acceleration"].sel(point="distal1.C").values == pytest.approx(desired.acceleration, abs=1e-9)
+    # Forces, torques and energies of kinematics are not known, and none is zero.
+    for name in ("motor_energy", "motor_power", "applied_torque", "joint_force", "kinetic_energy"):
+        assert np.isnan(data[name]).all(), name
+    # Couplers of cranks with motors transmit no force of another drive.
+    assert motion.features.transmissions == ()
+    held = pf.kinematics(model, "A1", held={"A2": 3.0})
+    assert held.path == ""
+    assert pf.motion_dataset(held)["joint_coordinate"].sel(joint="A2").values == pytest.approx(3.0, abs=1e-12)
+    assert pf.kinematics(model, path="line", samples=5).path == "line"
+
+
+def test_a_duration_gives_the_end_of_a_drive():
+    motion = pf.kinematics(pf.load("four_bar"), "O", start=0.5, speed=2.0, duration=0.25)
+    assert motion.drive.end == pytest.approx(1.0, abs=1e-15)
+    assert motion.solution.t[-1] == pytest.approx(0.25, abs=1e-15)
+
+
+def test_an_assembly_that_had_to_be_moved_is_reported():
+    angles = {"crank": math.radians(200), "coupler": 0.4, "rocker": math.radians(100)}
+    moved = replace(four_bar(0.4, 0.1, 0.35, 0.25), assemblies=(pf.Assembly("open", angles),))
+    assert [one.code for one in pf.kinematics(moved, "O").findings] == ["assembly-elbow"]
+    assert pf.kinematics(moved, "O", start=1.0).findings == ()
+    # The rocker cannot be at 70 degrees; the crank's angle is nearer.
+    angles = {"crank": math.radians(60), "coupler": 0.4, "rocker": math.radians(70)}
+    beyond = replace(moved, assemblies=(pf.Assembly("open", angles),))
+    (one,) = pf.kinematics(beyond, "Q", end=1.8).findings
+    assert one.code == "assembly-moved"
+    assert "do not close with Q at 1.22173 rad as given" in one.text
+
+
+def test_drives_are_named_as_the_user_does():
+    heavy = picker(2)
+    data = pf.motion_dataset(pf.torques(heavy, "O1", held={"C1": -1.6}, start=1.2, end=1.9, speed=1e6))
+    found = json.loads(data.attrs["findings"])
+    assert [one["place"] for one in found if one["code"] == "speed-large"] == ["drive O1"]
+
+
 ROCKER = """
 name = "rocker"
 [ground]
@@ -486,6 +668,20 @@ def test_the_commands_write_results_that_other_commands_take(rocker, tmp_path):
         (["kinematics", "FILE", "--drive", "Q", "--to", "3"], "--drive: Q reaches its limit of reach, 2.49809 rad"),
         (["torques", "four_bar", "--fluctuation", "0"], "--fluctuation: not between 0 and 1"),
         (["torques", "four_bar", "--drive", "Q", "--fluctuation", "0.1"], "--fluctuation: a flywheel needs a drive"),
+        (["torques", "four_bar", "--fluctuation", "2%"], r"--fluctuation: not a number \(got '2%'\); write a number w"),
+        (
+            ["kinematics", "FILE", "--samples", "2.5"],
+            r"--samples: not a whole number \(got '2.5'\); write it in digits",
+        ),
+        (["kinematics", "FILE", "--rpm", "60"], '--rpm: no such option of paraflex kinematics; write --speed "60 rpm"'),
+        (["run", "FILE", "--drive", "O"], "--drive: no such option of paraflex run; it is one of paraflex kinematics"),
+        (["kinematics", "FILE", "O"], r"kinematics: unexpected argument \(got 'O'\)"),
+        (["kinematics", "FILE", "--drive", "O", "--drive", "Q"], r"--drive: two joints move \(got 'O, Q'\); hold the"),
+        (["kinematics", "FILE", "--drive", "O", "--drive", "Q=1 m"], "--drive: a quantity in m where one in rad is"),
+        (["kinematics", "FILE", "--drive", "O", "--drive", "Q="], r"--drive: has no value \(got 'Q='\)"),
+        (["kinematics", "FILE", "--drive", "O", "--from", "abc"], "--from: not a number"),
+        (["torques", "five_bar", "--mode", "+-"], r'--mode: mode "\+-" cannot drive'),
+        (["torques", "four_bar", "--mode", "++"], "--mode: has no effect without a path"),
     ],
 )
 def test_wrong_requests_are_answered_in_one_line(rocker, tmp_path, words, message):

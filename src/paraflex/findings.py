@@ -66,6 +66,7 @@ _WRONG = {
 _DOUBTFUL = {
     "special-pose": "The pose of an assembly has degrees of freedom that its neighbours lack: a change point.",
     "assembly-elbow": "An assembly closed far from the given angles: it may be the other elbow.",
+    "assembly-moved": "The loops of an assembly do not close with its drive where it was given, but beside it.",
     "beam-thick": "A beam is nearly as thick as it is long, or thicker: a section in millimetres, or turned.",
     "beam-thin": "A beam is thinner than a ten-thousandth of its length.",
     "beam-overhang": "Most of a beam lies beyond its named points.",

@@ -10,14 +10,19 @@ from typing import Annotated, Any
 
 import typer
 
-from paraflex.errors import InputError, ParaflexError
+from paraflex.errors import InputError, ParaflexError, listed
 from paraflex.seals import unsealed
 from . import BAD_INPUT, FAILURE
 from .collected import collecting
 from .commands.once import Command
-from .commands.requests import with_options
+from .commands.requests import flags_of, with_options
 from .commands.shell import COMMANDS, GROUPS
 from .signals import exit_code
+
+# Errors of the command line, of Click or of Typer's copy of it.
+_USAGE: type[Exception] = typer.BadParameter.__bases__[0]
+# Options of other programs, and those of paraflex for the same.
+_MEANT = {"--rpm": 'write --speed "60 rpm"', "--range": 'write --from "0 deg" --to "90 deg"'}
 
 app: typer.Typer = typer.Typer(
     name="paraflex",
@@ -70,7 +75,14 @@ def main() -> None:
     """Run the command line; errors of paraflex and interrupts are printed as one line and set the exit code."""
     _set_up()
     try:
-        app()
+        sys.exit(app(standalone_mode=False))
+    except _USAGE as error:
+        # A command without arguments answers with its help.
+        without = type(error).__name__ == "NoArgsIsHelpError"
+        typer.echo(str(error), err=True) if without else _print_error(_usage(error))
+        sys.exit(BAD_INPUT)
+    except typer.Abort:
+        sys.exit(FAILURE)
     except InputError as error:
         _print_error(error)
         sys.exit(BAD_INPUT)
@@ -95,6 +107,28 @@ def main() -> None:
     except KeyboardInterrupt as interrupt:
         typer.echo(": ".join(["interrupted", *map(str, interrupt.args)]), err=True)
         sys.exit(exit_code())
+
+
+def _usage(error: Any) -> InputError:
+    """Return an error of the command line as one of this package: option, problem, value and remedy."""
+    command = "" if error.ctx is None else error.ctx.command_path.rpartition("paraflex")[2].strip()
+    text = error.format_message().removesuffix(".")
+    if isinstance(error, typer.BadParameter) and error.param is not None:
+        problem, _, remedy = error.message.partition("; ")
+        return InputError(problem, field=max(error.param.opts, key=len), remedy=remedy)
+    option, alike = getattr(error, "option_name", ""), getattr(error, "possibilities", ())
+    if option and hasattr(error, "possibilities"):
+        others = [one.name for one in COMMANDS if option in flags_of(one.request)]
+        remedy = f"did you mean {' or '.join(sorted(alike))}?" if alike else "--help lists all"
+        remedy = f"it is one of paraflex {listed(others, 3)}" if others else remedy
+        return InputError(f"no such option of paraflex {command}", field=option, remedy=_MEANT.get(option, remedy))
+    if option:
+        return InputError("has no value", field=option, remedy="write one behind it; --help describes it")
+    if "extra argument" in text:
+        value, remedy = text.rpartition("(")[2].rstrip(")"), 'options begin with "--"; texts with blanks need quotes'
+        return InputError("unexpected argument", field=command, value=value, remedy=remedy)
+    problem, near = (part[:1].lower() + part[1:] for part in text.partition(". ")[::2])
+    return InputError(problem, field=command or "paraflex", remedy=near or "see --help")
 
 
 def _set_up() -> None:

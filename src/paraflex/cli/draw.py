@@ -22,6 +22,7 @@ from paraflex.plots.themes import theme
 from paraflex.results.acting import drive_speed
 from paraflex.writing import portable_name, whole_file
 from .commands.models import DrawRequest
+from .commands.requests import flagged
 from .replacing import refuse_existing
 from .request import conflict, requested_model
 from .signals import end_by_ctrl_c, exit_code
@@ -58,7 +59,9 @@ def draw_command(request: DrawRequest) -> int | None:
             raise InputError("unknown kind of drawing", field="--output", value=request.output, remedy=remedy)
         refuse_existing(output, request.force)
     model = requested_model(request.model)
-    shown = pose_of(model, assembly=request.assembly, path=request.path)
+    with flagged(request):
+        theme(request.theme)
+        shown = pose_of(model, assembly=request.assembly, path=request.path)
     if output is None:
         output = Path(tempfile.mkdtemp(prefix="paraflex-")) / f"{portable_name(model.mechanism.name)}.html"
     # Matplotlib takes longer to import than everything up to here, so it is imported only now.

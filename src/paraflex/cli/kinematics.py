@@ -8,9 +8,9 @@ import numpy as np
 import xarray as xr
 
 from paraflex.driven import flywheel, kinematics, torques
-from paraflex.errors import AssemblyError, InputError, UnreachablePathError
+from paraflex.errors import ActuationError, AssemblyError, InputError, UnreachablePathError, renamed
 from paraflex.figures.kinematics import kinematics_of, kinematics_tables
-from paraflex.files import Model
+from paraflex.files import Model, load_path
 from paraflex.files.fields import number_in
 from paraflex.formatting import number, quantity
 from paraflex.results import motion_dataset, motion_summary
@@ -18,13 +18,11 @@ from paraflex.results.kinematics import add_kinematics
 from paraflex.results.loads import load_figures
 from . import COMPLETE
 from .commands.models import KinematicsRequest, TorquesRequest
-from .commands.requests import flagged
+from .commands.requests import flagged, flags
 from .ending import give_dataset
 from .request import command_provenance, locating_errors, of_assembly, requested_model
 from .run_lines import load_lines
 from .tables import PlainConsole, print_tables
-
-_EXAMPLES = {"rad": "90 deg", "m": "50 mm", "rad/s": "60 rpm", "m/s": "20 mm/s"}
 
 
 def kinematics_command(request: KinematicsRequest) -> int:
@@ -38,17 +36,21 @@ torques_command = kinematics_command
 
 
 def _data(model: Model, request: KinematicsRequest) -> xr.Dataset:
-    compute, fluctuation = (torques, request.fluctuation) if isinstance(request, TorquesRequest) else (kinematics, None)
-    with flagged(request), locating_errors(model):
+    asked, compute, fluctuation = _asked(model, request), kinematics, None
+    if isinstance(request, TorquesRequest):
+        asked["mode"], compute, fluctuation = request.mode, torques, request.fluctuation
+    assembly = request.assembly or model.study.assembly
+    with flagged(request), locating_errors(model), renamed("drive", only="held"):
         try:
-            motion = compute(
-                model, request.drive, **_quantities(model, request), duration=request.duration,
-                assembly=request.assembly or model.study.assembly, samples=request.samples,
-            )  # fmt: skip
+            motion = compute(model, **asked, duration=request.duration, assembly=assembly, samples=request.samples)
         except UnreachablePathError as error:
-            raise InputError(error.problem, field="drive", remedy=error.remedy) from error
+            follows = request.path or (not request.drive and model.paths)
+            field = f"path.{request.path or model.path_name()}" if follows else "drive"
+            raise InputError(error.problem, field=field, remedy=error.remedy) from error
         except AssemblyError as error:
-            raise of_assembly(error, model) from error
+            raise of_assembly(error, model).at(f"assembly.{model.mechanism.assembly(assembly).name}") from error
+        except ActuationError as error:
+            raise InputError(error.problem, field="mode", remedy=error.remedy) from error
         wheel = None if fluctuation is None else flywheel(motion, fluctuation)
     given = {one.name: getattr(request, one.name) for one in fields(request) if one.name not in ("model", "files")}
     command = "torques" if isinstance(request, TorquesRequest) else "kinematics"
@@ -59,22 +61,36 @@ def _data(model: Model, request: KinematicsRequest) -> xr.Dataset:
     return data
 
 
-def _quantities(model: Model, request: KinematicsRequest) -> dict[str, float]:
-    """Return start, end and speed of the drive in SI units; those of a joint that slides are lengths."""
-    joint = next((one for one in model.mechanism.joints if one.name == request.drive), None)
-    unit = "m" if joint is not None and joint.slides else "rad"
+def _asked(model: Model, request: KinematicsRequest) -> dict[str, Any]:
+    """Return drive, held joints, path, and start, end and speed of the drive, in SI units."""
+    slides = {one.name: one.slides for one in model.mechanism.joints}
+    moving = [text for text in request.drive if "=" not in text or text in slides]
+    if len(moving) > 1:
+        twice = len(set(moving)) < len(moving)
+        raise InputError(
+            "names a joint twice" if twice else "two joints move", field="--drive", value=", ".join(moving),
+            remedy="leave one out" if twice else f'hold the others: --drive "{moving[1]}=VALUE"',
+        )  # fmt: skip
+    drive, held = next(iter(moving), None), dict[str, float]()
+    unit = "m" if slides.get(drive or "", False) else "rad"
+    for text in request.drive:
+        joint, _, value = (part.strip() for part in text.rpartition("="))
+        if text not in moving:
+            if joint in held or not value:
+                problem = "holds a joint twice" if joint in held else "has no value"
+                raise InputError(problem, field="--drive", value=text, remedy='write one such as "JOINT=30 deg"')
+            held[joint] = _number(value, "m" if slides[joint] else "rad", "--drive") if joint in slides else 0.0
     texts = {"start": (request.start, unit), "end": (request.end, unit), "speed": (request.speed, f"{unit}/s")}
-    found = {}
-    for name, (text, wanted) in texts.items():
-        if text is not None:
-            try:
-                found[name] = number_in(text, wanted)
-            except InputError as error:
-                if error.problem.startswith("not a number"):
-                    remedy = f'write a number in {wanted}, or one with its unit, such as "{_EXAMPLES[wanted]}"'
-                    raise InputError("not a quantity", field=name, value=text, remedy=remedy) from None
-                raise error.at(name) from None
-    return found
+    flag, path = flags(request), request.path
+    found = {name: _number(text, wanted, flag[name]) for name, (text, wanted) in texts.items() if text is not None}
+    of_file = path is not None and path not in model.paths and path.endswith(".toml")
+    asked: dict[str, Any] = {"drive": drive, "held": held, "path": load_path(path) if of_file and path else path}
+    return asked | found
+
+
+def _number(text: str, unit: str, field: str) -> float:
+    with renamed(field):
+        return number_in(text, unit)
 
 
 def _summary(data: xr.Dataset) -> dict[str, Any]:
@@ -86,9 +102,10 @@ def _print(out: PlainConsole, data: xr.Dataset) -> None:
     freedoms, drive = found["degrees_of_freedom"], found["drive"]
     free = f"{freedoms} degree{'s' * (freedoms != 1)} of freedom"
     if drive is None:
-        out.print_lines(
-            f"{data.attrs['mechanism']}: {free}, {count} positions over {number(data['time'][-1].item())} s"
-        )
+        way = f"along path {found['path']}, " if found["path"] else ""
+        acting = f" by mode {found['mode']}" if found["mode"] else ""
+        over = f"{count} positions over {number(data['time'][-1].item())} s"
+        out.print_lines(f"{data.attrs['mechanism']}: {free}; {way}{over}{acting}")
     else:
         unit = drive["unit"]
         ends = " to ".join(quantity(drive[name], unit, digits=5) for name in ("start", "end"))
@@ -96,13 +113,23 @@ def _print(out: PlainConsole, data: xr.Dataset) -> None:
         speed = quantity(drive["speed"], f"{unit}/s", digits=5)
         out.print_lines(f"{data.attrs['mechanism']}: {free}; {drive['joint']} moves from {ends}{turn}, at {speed}; "
                         f"{count} positions")  # fmt: skip
+        for joint, value in drive["held"].items():
+            out.print_lines(f"{joint} is held at {quantity(value, found['joint_units'][joint], digits=5)}")
         if None not in drive["reach"]:
             low, high = (quantity(value, unit, digits=7) for value in drive["reach"])
             out.print_lines(f"limits of reach of {drive['joint']}: {low} and {high}; the range ends beside them")
     print_tables(out, kinematics_tables(data))
     if np.isfinite(data["kinetic_energy"].values).any():
         loads = load_figures(data)
-        out.print_lines(*load_lines({"": loads}), _shaking(loads["frame"]))
+        # Drives of the command have no table of the model.
+        named = {} if drive is None else {drive["name"]: drive["joint"], **{joint: joint for joint in drive["held"]}}
+        named = {name: f"drive {joint}" for name, joint in named.items()}
+        if found["path"]:
+            loads["drives"], named = loads["motors"], {name: f"motor {name}" for name in loads["motors"]}
+        lines = load_lines({"": loads})
+        for name, text in named.items():
+            lines = [line.replace(f"prescribed.{name}:", f"{text}:") for line in lines]
+        out.print_lines(*lines, _shaking(loads["frame"]))
     wheel = found.get("flywheel")
     if wheel is not None:
         out.print_lines(

@@ -1,26 +1,43 @@
 """Motion of a driven mechanism at any time, from the closure of its loops."""
 
 import math
-from dataclasses import dataclass, replace
-from functools import cached_property
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field, replace
+from functools import cached_property, partial
 from typing import NamedTuple
 
 import numpy as np
+import scipy
 
-from paraflex.arrays import Array, Brief
+from paraflex.arrays import Array, Brief, Mask
 from paraflex.dynamics import System, build_system
 from paraflex.dynamics.soundness import Mobility, mobility
 from paraflex.dynamics.state import State
 from paraflex.integrators import Solution
+from paraflex.kernel.closure import LOOPS_CLOSED
 from paraflex.mechanism import ConstantSpeed
-from paraflex.paths.loops import LoopClosure
+from paraflex.paths import RigidMotion
+from paraflex.paths.closure import PathClosure
+from paraflex.paths.loops import ClosedLoops, LoopClosure
 
+# Part of a turn or travel, on either side of a change point, over which a motion is interpolated.
+_BESIDE = 1.0 / 720.0
+# Deviation beyond a change point from the motion before it, as a part of the move, on the same branch.
+_SAME_BRANCH = 0.05
+# Change points that a motion may pass.
+_MOST_PASSED = 100
+Target = Callable[[Array], Array]
 NO_TASKS = np.zeros(0, dtype=np.int64)
 
 
 def no_target(times: Array) -> Array:
     """Return the task coordinates (times, 3, 0) of a motion that drives alone determine."""
     return np.zeros((times.size, 3, 0))
+
+
+def width_beside(drive: "Drive | None", end: float) -> float:
+    """Return the time before and after a change point over which a motion until `end` is interpolated [s]."""
+    return _BESIDE * (2.0 * math.pi / drive.speed if drive is not None and drive.unit == "rad" else end)
 
 
 class ExactState(NamedTuple):
@@ -48,6 +65,8 @@ class Drive:
     reach : tuple of float or None
         Lowest and highest angle or travel that the mechanism allows in this assembly, None for those that do not lie
         in the range examined.
+    held : mapping of str to float
+        Other joints that are held, with their angles [rad] or travels [m].
     """
 
     name: str
@@ -57,6 +76,7 @@ class Drive:
     speed: float
     unit: str
     reach: tuple[float | None, float | None] = (None, None)
+    held: Mapping[str, float] = field(default_factory=dict)
 
     @property
     def turns(self) -> float:
@@ -83,6 +103,63 @@ class Drive:
         return self.start + t * self.profile.speed
 
 
+def follow_past(
+    loops: LoopClosure, target: Target, grid: Array, keep: Mask, pose: Array, beside: float
+) -> tuple[ClosedLoops, list[float]]:
+    """Follow a motion as `LoopClosure.follow` does, and past change points, on the branch whose velocities continue.
+
+    Near a change point, where assemblies meet, the equations are ill-conditioned. There the motion is the polynomial
+    of degree five through positions, velocities and accelerations at a time `beside` before and after it [s].
+
+    Returns
+    -------
+    loops, passed
+        Motion as far as the loops close, and the times of the change points [s].
+    """
+    passed: list[float] = []
+    parts: list[tuple[Array, ...]] = []
+    while True:
+        found = loops.follow(target, grid, keep, pose.copy())
+        singular, t = found.stopped, found.arrays[0]
+        count = int(np.searchsorted(t, singular - beside, side="right"))
+        start, begun = (float(t[count - 1]), found.arrays[1][count - 1]) if count else (float(grid[0]), pose)
+        # Motions along paths end at singular positions of their own kind.
+        if found.closed or loops.coordinates.size or start > singular - beside or len(passed) == _MOST_PASSED:
+            break
+        ends = (singular - beside, singular + beside)
+        before = state_at(loops, target, start, begun, ends[0])
+        after = _continued(loops, before, ends)
+        if after is None:
+            break
+        passed.append(singular)
+        inside = grid[keep & (grid > ends[0]) & (grid <= ends[1])]
+        curve = scipy.interpolate.BPoly.from_derivatives(ends, [np.concatenate(before), np.concatenate(after)])
+        between = [curve(inside), *(curve.derivative(order)(inside) for order in (1, 2))]
+        parts += [tuple(part[:count] for part in found.arrays), (inside, *between, np.zeros((*between[0].shape, 0)))]
+        later = grid > ends[1]
+        grid, keep = np.append(ends[1], grid[later]), np.append(False, keep[later])
+        pose = after.q[0]
+    arrays = tuple(np.concatenate(each) for each in zip(*parts, found.arrays, strict=True))
+    return replace(found, arrays=arrays), passed
+
+
+def state_at(loops: LoopClosure, target: Target, start: float, pose: Array, t: float) -> ExactState:
+    """Return the motion (1, n) at a time from the pose at an earlier one [s]."""
+    found = loops.follow(target, np.array([start, t]), np.array([False, True]), pose.copy())
+    return ExactState(*found.arrays[1:4])
+
+
+def _continued(loops: LoopClosure, before: ExactState, ends: tuple[float, float]) -> ExactState | None:
+    """Return the state beyond a change point on the same branch; None if there is none, as at a limit of reach."""
+    step, units = ends[1] - ends[0], loops.system.units
+    predicted = before.q + step * (before.v + 0.5 * step * before.a)
+    status, _, (q, v, a, _) = loops.run(np.array(ends[1:]), no_target(np.zeros(1)), predicted[0])
+    off, move = np.max(np.abs((q - predicted) / units)), np.max(np.abs((q - before.q) / units))
+    turned, rate = np.max(np.abs((v - before.v - step * before.a) / units)), np.max(np.abs(before.v / units))
+    same = status == LOOPS_CLOSED and off <= _SAME_BRANCH * move and turned <= _SAME_BRANCH * rate
+    return ExactState(q, v, a) if same else None
+
+
 @dataclass(frozen=True)
 class ExactMotion(Brief):
     """Motion of a driven mechanism, at samples and between them.
@@ -97,12 +174,26 @@ class ExactMotion(Brief):
         Joint that moves at constant speed; None for other prescribed motions.
     loops : LoopClosure
         Equations that determine the motion.
+    rigid : RigidMotion, optional
+        Motion along a path; None for one that drives determine.
+    passed : tuple of float
+        Times of change points [s].
     """
 
     system: System
     solution: Solution
     drive: Drive | None
     loops: LoopClosure
+    rigid: RigidMotion | None = None
+    passed: tuple[float, ...] = ()
+
+    @property
+    def target(self) -> Target:
+        """Function that returns the task coordinates over time."""
+        if self.rigid is None:
+            return no_target
+        assert isinstance(self.loops, PathClosure)
+        return partial(self.loops.target, self.rigid.path)
 
     @cached_property
     def mobility(self) -> Mobility:
@@ -112,7 +203,11 @@ class ExactMotion(Brief):
 
     def at(self, t: float) -> ExactState:
         """Return the motion (1, n) at a time within the samples [s], exact to rounding."""
-        k = int(np.clip(np.searchsorted(self.solution.t, t) - 1, 0, self.solution.t.size - 1))
-        times = np.array([self.solution.t[k], t])
-        found = self.loops.follow(no_target, times, np.array([False, True]), self.solution.q[k].copy())
-        return ExactState(*found.arrays[1:4])
+        times = self.solution.t
+        beside = width_beside(self.drive, float(times[-1]))
+        k = int(np.clip(np.searchsorted(times, t) - 1, 0, times.size - 1))
+        # The motion does not start from samples near a change point.
+        while k > 0 and any(abs(times[k] - one) <= beside for one in self.passed):
+            k -= 1
+        given = np.array([times[k], t]), np.array([False, True])
+        return ExactState(*follow_past(self.loops, self.target, *given, self.solution.q[k], beside)[0].arrays[1:4])

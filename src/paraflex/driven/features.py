@@ -236,6 +236,8 @@ def _couplers(motion: ExactMotion) -> Iterator[tuple[str, str, PointRef, PointRe
 def _transmissions(motion: ExactMotion) -> Iterator[Transmission]:
     """Yield the transmission angles of couplers at bodies that are guided by the ground and not driven."""
     guides, driven, t = _guides(motion), _driven(motion), motion.solution.t
+    if motion.rigid is not None:
+        driven |= {motor.joint for motor in motion.system.mechanism.motors}
     for coupler, joint, far, near in _couplers(motion):
         guide = guides.get(far.body)
         if far.on_ground or guide is None or guide.name in driven or near.body == GROUND:

@@ -2,35 +2,43 @@
 
 import math
 import time
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
+from paraflex.actuation import allocate, required_effort
 from paraflex.arguments import checked_arguments, named_in_errors
 from paraflex.arrays import Array
-from paraflex.dynamics import System, build_system, reference_pose, still_signals
+from paraflex.dynamics import System, build_system, dependence, joint_coordinate, reference_pose, still_signals
+from paraflex.dynamics.joint_coordinates import joint_value, value_text
 from paraflex.dynamics.stiffness import RestingForces
-from paraflex.errors import AssemblyError, InputError
+from paraflex.errors import AssemblyError, InputError, UnreachablePathError
 from paraflex.findings import Finding
+from paraflex.formatting import quantity
 from paraflex.integrators import Solution, check_times
 from paraflex.kernel.bodies import stored_energy
 from paraflex.kernel.constraints import constraint_values
 from paraflex.kernel.packed import make_scratch
 from paraflex.limits import solvable
-from paraflex.mechanism import Mechanism, standing
+from paraflex.mechanism import ActuationMode, Mechanism, mode_of_motors, parse_mode, standing
 from paraflex.mechanism.masses import check_masses, with_any_masses
 from paraflex.motion import MotionRun
-from paraflex.paths import ModelWithPaths
+from paraflex.paths import ModelWithPaths, Path, PathFollower, RigidMotion, path_follower
+from paraflex.paths.closure import PathClosure
 from paraflex.paths.loops import LoopClosure
+from paraflex.validity import large_rotations, shared_loads
 from .assemblies import FoundAssembly, assemblies_of
-from .exact import NO_TASKS, Drive, ExactMotion
+from .exact import Drive, ExactMotion
 from .features import KinematicFeatures, features_of
-from .ranges import chosen_drive, driven_loops, followed, ranged
+from .ranges import Wish, check_determined, chosen_drive, driven_loops, followed, freedoms_at, ranged
 
 # Samples between which properties are located: of a drive, and at most for other motions.
 _FINE, _FINEST = 361, 1441
+# Singular values below this part of the largest leave forces undetermined.
+_SINGULAR = 1e-9
 
 
 @named_in_errors("a driven motion", "the motion that kinematics returns")
@@ -47,16 +55,42 @@ class DrivenMotion(MotionRun):
         Joint that moves at constant speed; None if the mechanism's own prescribed motions act.
     loops : LoopClosure
         Equations that determine the motion.
+    effort : (k, motors) array
+        Torques or forces of the motors: NaN without loads, zero without a path [N m, N].
+    rigid : RigidMotion, optional
+        Motion of the end-effector along a path; None for a motion that drives determine.
+    path, mode : str
+        Name of the path and of the actuation mode; empty for none.
+    passed : tuple of float
+        Times of change points that the motion passes [s].
+    notes : tuple of Finding
+        Findings on the assembly, change points, and forces.
     """
 
     drive: Drive | None
     loops: LoopClosure
+    effort: Array
+    rigid: RigidMotion | None = None
+    path: str = ""
+    mode: str = ""
+    passed: tuple[float, ...] = ()
+    notes: tuple[Finding, ...] = ()
     open_loop: ClassVar[bool] = False
+
+    @property
+    def in_time(self) -> bool:
+        """Whether torques change in time, as those of motors along a path do."""
+        return True
+
+    @property
+    def applied(self) -> Array:
+        """Torques (k, motors) at the times of the solution [N m]."""
+        return self.effort
 
     @cached_property
     def findings(self) -> tuple[Finding, ...]:
-        """Findings of the motion; none, as it is exact to rounding."""
-        return ()
+        """Findings on the assembly, change points, and forces; the motion itself is exact."""
+        return self.notes
 
     @cached_property
     def exact(self) -> ExactMotion:
@@ -66,10 +100,16 @@ class DrivenMotion(MotionRun):
             drive = replace(drive, end=drive.start + math.copysign(2.0 * math.pi, drive.end - drive.start))
         end = float(solution.t[-1]) if drive is None else drive.duration
         times = np.linspace(0.0, end, _FINE if drive is not None else int(np.clip(solution.t.size, _FINE, _FINEST)))
+        passed, rigid = self.passed, self.rigid
         if times.size != solution.t.size or times[-1] != solution.t[-1]:
-            t, q, v, a = followed(self.loops, times, solution.q[0], drive)
+            if rigid is None:
+                (t, q, v, a), passed = followed(self.loops, times, solution.q[0], drive)
+            else:
+                assert isinstance(self.loops, PathClosure)
+                rigid = PathFollower(self.loops, solution.q[0], rigid.path)(times)
+                t, q, v, a = rigid.t, rigid.q, rigid.v, rigid.a
             solution = replace(solution, t=t, q=q, v=v, a=a)
-        return ExactMotion(self.system, solution, drive, self.loops)
+        return ExactMotion(self.system, solution, drive, self.loops, rigid, passed)
 
     @cached_property
     def features(self) -> KinematicFeatures:
@@ -87,6 +127,8 @@ def kinematics(
     mechanism: Mechanism | ModelWithPaths,
     drive: str | None = None,
     *,
+    held: Mapping[str, float] | None = None,
+    path: Path | str | None = None,
     start: float | None = None,
     end: float | None = None,
     speed: float | None = None,
@@ -94,7 +136,7 @@ def kinematics(
     samples: int = 361,
     assembly: str | None = None,
 ) -> DrivenMotion:
-    """Compute positions, velocities and accelerations of a mechanism over the travel of a joint that drives it.
+    """Compute positions, velocities and accelerations of a mechanism that a joint drives, or that follows a path.
 
     All bodies are rigid. Masses have no effect and are not needed.
 
@@ -103,15 +145,20 @@ def kinematics(
     mechanism : Mechanism or Model
         Mechanism, or a model with one.
     drive : str, optional
-        Joint that moves at constant speed. By default the mechanism's prescribed motions act, or, if there are none,
-        the joint of its only motor.
+        Joint that moves at constant speed. By default the mechanism's prescribed motions act. If they leave degrees of
+        freedom open, the end-effector follows the model's path, or else the joint of the only motor moves.
+    held : mapping of str to float, optional
+        Other joints, which are held at an angle [rad] or travel [m], if there are several degrees of freedom.
+    path : Path or str, optional
+        Path of the end-effector, or for a model the name of one.
     start, end : float, optional
         First and last angle [rad] or travel [m] of the drive. By default a whole turn from the assembly or from
         `start`; if the joint cannot make one, the range between its limits of reach.
     speed : float, optional
         Speed of the drive [rad/s, m/s]; by default that of the prescribed motion at its joint, else 1.
     duration : float, optional
-        Duration of prescribed motions that are not of constant speed [s]; that of the model's study by default.
+        Duration [s]: of the drive in place of its end, else of prescribed motions, by default that of the model's
+        study, or of the motion along a path, by default the path's.
     samples : int
         Number of samples, evenly spaced, both ends included.
     assembly : str, optional
@@ -130,42 +177,112 @@ def kinematics(
         The loops do not close.
     UnreachablePathError
         The drive cannot cover the range, because of a limit of reach or a change point; the error names its angle or
-        travel.
+        travel. Or the path cannot be followed.
     """
     began = time.perf_counter()
-    check_times(None, samples)
+    check_times(duration, samples)
     for name, value in (("start", start), ("end", end), ("speed", speed)):
         if value is not None and not math.isfinite(value):
             raise InputError("not a finite number", field=name, value=value, remedy="give it in SI units and radians")
-    light = with_any_masses(Mechanism.from_source(mechanism))
-    moved = standing(light.rigid(), assembly)
-    begun = LoopClosure(moved, 0.0, None, NO_TASKS)
-    near = reference_pose(begun.system, moved.assembly(assembly))
-    law = chosen_drive(moved, drive, start, end, speed, begun.system, near)
+    moved = standing(with_any_masses(Mechanism.from_source(mechanism)).rigid(), assembly)
+    wish = Wish(drive, held or {}, start, end, speed, duration)
+    chosen = moved.assembly(assembly)
+    freedoms, closed = freedoms_at(moved, chosen)
+    followed_path = _path(mechanism, path, wish, freedoms - len(moved.prescribed))
+    if followed_path is not None:
+        way, name = followed_path
+        last = way.duration if duration is None else duration
+        orientation = getattr(getattr(mechanism, "study", None), "orientation", 0.0)
+        follow = path_follower(moved, way, last, assembly=chosen, orientation=orientation)
+        rigid = follow(np.linspace(0.0, last, samples))
+        return _motion(moved, (rigid.t, rigid.q, rigid.v, rigid.a), began, None, follow.closure, rigid=rigid, path=name)
+    system = build_system(replace(moved, prescribed=()))
+    near = reference_pose(system, chosen)
+    law = chosen_drive(moved, wish, freedoms, system, near)
     if law is None:
+        check_determined(moved, freedoms)
         if duration is None:
             duration = getattr(getattr(mechanism, "study", None), "duration", None)
         if duration is None:
             raise InputError("is missing", field="duration", remedy="give it in seconds, or name a drive")
         check_times(duration, None)
-        loops, pose = driven_loops(moved, near, duration)
-        arrays = followed(loops, np.linspace(0.0, duration, samples), pose)
-    else:
-        try:
-            loops, pose, law = ranged(moved, law, near, fixed=end is not None)
-        except AssemblyError:
-            if start is not None:
-                raise
-            # The assembly's angle of the drive is approximate: another joint's may be nearer.
-            closed = begun.assembled(moved.assembly(assembly))
-            law = chosen_drive(moved, drive, start, end, speed, begun.system, closed)
-            assert law is not None
-            loops, pose, law = ranged(moved, law, closed, fixed=end is not None)
-        moved = loops.mechanism
-        arrays = followed(loops, np.linspace(0.0, law.duration, samples), pose, law)
-    system = build_system(moved)
-    return DrivenMotion(system, arrays[0], {motor.name: 0.0 for motor in moved.motors},
-                        _solution(system, arrays, began), law, loops)  # fmt: skip
+        loops, pose = driven_loops(moved, near, duration, freedoms)
+        arrays, passed = followed(loops, np.linspace(0.0, duration, samples), pose)
+        return _motion(moved, arrays, began, None, loops, passed=passed)
+    notes = list[Finding]()
+    loops, pose, law, moved_to = _ranged(moved, law, wish, freedoms, system, (near, closed))
+    if moved_to:
+        text = (
+            f"the loops do not close with {law.joint} at {value_text(system, law.joint, near)} as given, but {moved_to}"
+        )
+        remedy = "correct the angles of the assembly, or give the start of the drive"
+        notes.append(Finding("assembly-moved", f"assembly.{chosen.name}", text, remedy))
+    if start is None and not law.held:
+        kept = law.start == joint_value(system, law.joint, near)
+        notes += large_rotations(system, chosen, pose if kept else closed)
+    arrays, passed = followed(loops, np.linspace(0.0, law.duration, samples), pose, law)
+    return _motion(loops.mechanism, arrays, began, law, loops, passed=passed, notes=notes)
+
+
+def _ranged(
+    mechanism: Mechanism, law: Drive, wish: Wish, freedoms: int, system: System, poses: tuple[Array, Array]
+) -> tuple[LoopClosure, Array, Drive, str]:
+    """Return closure, first pose and drive from an assembly as given or, if that fails, closed; then also its value."""
+    near, closed = poses
+    fixed = wish.end is not None or wish.duration is not None
+    try:
+        return *ranged(mechanism, law, near, freedoms, fixed=fixed), ""
+    except UnreachablePathError:
+        raise
+    except AssemblyError as error:
+        if wish.start is not None or law.held:
+            field, value = ("held", ", ".join(law.held)) if wish.start is None else ("start", wish.start)
+            remedy = "give one within reach of the assembly"
+            raise InputError(error.cause.rstrip(","), field=field, value=value, remedy=remedy) from error
+    # The assembly's angle of the drive is approximate: another joint's may be nearer.
+    again = chosen_drive(mechanism, wish, freedoms, system, closed)
+    assert again is not None
+    return *ranged(mechanism, again, closed, freedoms, fixed=fixed), f"at {value_text(system, law.joint, closed)}"
+
+
+def _path(
+    source: Mechanism | ModelWithPaths, path: Path | str | None, wish: Wish, left: int
+) -> tuple[Path, str] | None:
+    """Return the path that the end-effector follows, and its name; None if drives determine the motion."""
+    given = "drive" if wish.drive else wish.of_drive
+    if path is not None and given:
+        raise InputError(
+            "has no effect along a path", field=given, value=getattr(wish, given),
+            remedy="leave out the path, or what drives a joint",
+        )  # fmt: skip
+    if path is not None and not isinstance(path, str):
+        return path, "path"
+    if isinstance(source, Mechanism) or (path is None and (given or left <= 0 or not getattr(source, "paths", ()))):
+        if path is not None:
+            raise InputError(
+                "a mechanism has no paths by name", field="path", value=path,
+                remedy="give the model that paraflex.load reads, or a path such as Line",
+            )  # fmt: skip
+        return None
+    return source.path(path), path or getattr(source, "path_name", str)(None)
+
+
+def _motion(
+    mechanism: Mechanism, arrays: tuple[Array, ...], began: float, law: Drive | None, loops: LoopClosure, *,
+    passed: tuple[float, ...] = (), notes: Sequence[Finding] = (), **more: Any,
+) -> DrivenMotion:  # fmt: skip
+    system, still = build_system(mechanism), {motor.name: 0.0 for motor in mechanism.motors}
+    effort = np.full((arrays[0].size, len(still)), np.nan)
+    if passed:
+        where = "drives are" if law is None else f"{law.joint} is"
+        places = (f"t = {t:.6g} s" if law is None else quantity(law.at(t), law.unit, digits=6) for t in passed)
+        text = f"assemblies meet, a change point, where {where} at {', '.join(places)}"
+        remedy = "the motion continues in the assembly whose velocities are continuous"
+        notes = [*notes, Finding("special-pose", "drive" if law is None else f"drive {law.joint}", text, remedy)]
+    solution = _solution(system, arrays, began)
+    return DrivenMotion(
+        system, arrays[0], still, solution, law, loops, effort, passed=passed, notes=tuple(notes), **more
+    )
 
 
 @checked_arguments()
@@ -174,6 +291,9 @@ def torques(
     mechanism: Mechanism | ModelWithPaths,
     drive: str | None = None,
     *,
+    held: Mapping[str, float] | None = None,
+    path: Path | str | None = None,
+    mode: str | ActuationMode | None = None,
     start: float | None = None,
     end: float | None = None,
     speed: float | None = None,
@@ -181,14 +301,17 @@ def torques(
     samples: int = 361,
     assembly: str | None = None,
 ) -> DrivenMotion:
-    """Compute the motion as `kinematics` does, with the torque of the drive, joint forces and shaking forces.
+    """Compute the motion as `kinematics` does, with the torques of drives or motors, joint forces and shaking forces.
 
     The inverse dynamics of the rigid mechanism includes weight, loads, springs, dampers and friction.
 
     Parameters
     ----------
-    mechanism, drive, start, end, speed, duration, samples, assembly
+    mechanism, drive, held, path, start, end, speed, duration, samples, assembly
         See `kinematics`.
+    mode : str or ActuationMode, optional
+        Actuation mode along a path: its motors share the effort with the least norm of torques. By default the first
+        of the model's study or of the mechanism, or all motors.
 
     Returns
     -------
@@ -199,12 +322,29 @@ def torques(
     ------
     InputError, AssemblyError, UnreachablePathError
         See `kinematics`; also InputError for a body without mass.
+    ActuationError, SingularActuationError
+        The motors of the mode cannot drive the mechanism along the path.
     """
-    check_masses(Mechanism.from_source(mechanism))
+    source = Mechanism.from_source(mechanism)
+    check_masses(source)
     motion = kinematics(
-        mechanism, drive, start=start, end=end, speed=speed, duration=duration, samples=samples, assembly=assembly
-    )
-    return replace(motion, solution=with_loads(motion.system, motion.solution))
+        mechanism, drive, held=held, path=path, start=start, end=end, speed=speed, duration=duration, samples=samples,
+        assembly=assembly,
+    )  # fmt: skip
+    effort, name = np.zeros_like(motion.effort), ""
+    if motion.rigid is not None:
+        known_modes = (*getattr(getattr(mechanism, "study", None), "modes", ()), *source.modes)
+        chosen = mode or next(iter(known_modes), None)
+        if chosen is None:
+            chosen = mode_of_motors(source, [motor.name for motor in source.motors])
+        acting = parse_mode(source, chosen) if isinstance(chosen, str) else chosen
+        effort, name = allocate(required_effort(motion.rigid), acting), acting.name
+    elif mode is not None:
+        remedy = "leave it out, or follow a path"
+        raise InputError("has no effect without a path", field="mode", value=mode, remedy=remedy)
+    solution = with_loads(motion.system, motion.solution, effort)
+    notes = (*motion.notes, *shared_loads(motion.system, solution))
+    return replace(motion, solution=solution, effort=effort, mode=name, notes=notes)
 
 
 def _solution(system: System, arrays: tuple[Array, ...], began: float) -> Solution:
@@ -223,21 +363,26 @@ def _solution(system: System, arrays: tuple[Array, ...], began: float) -> Soluti
     )  # fmt: skip
 
 
-def with_loads(system: System, solution: Solution) -> Solution:
-    """Return a solution with the multipliers that its motion requires, and energies.
+def with_loads(system: System, solution: Solution, effort: Array) -> Solution:
+    """Return a solution with the multipliers that its motion requires under torques of motors, and energies.
 
-    Phi_q^T lambda = -(M a + h - loads), with the multipliers of springs, dampers and friction from their laws.
+    Phi_q^T lambda = -(M a + h - loads), with the multipliers of springs, dampers and friction from their laws, of least
+    norm where constraints depend on one another. At change points, where they are not determined, all are NaN.
     """
-    forces, held = RestingForces(system, 0.0, beams=True), system.constrained
+    forces, held = RestingForces(system, 0.0, beams=True), np.flatnonzero(system.constrained)
     forces.signals = still_signals(system.mechanism, float(solution.t[-1]))[0]
-    scratch = make_scratch(system.packed)
+    motors = [motor.joint for motor in system.mechanism.motors]
+    pushed = [joint_coordinate(system, joint, solution.q).rows for joint in motors]
+    scratch, ranks = make_scratch(system.packed), np.zeros(solution.t.size)
     multipliers, energies = np.zeros(solution.multipliers.shape), np.zeros((solution.t.size, 2))
     for k, (t, q, v, a) in enumerate(zip(solution.t, solution.q, solution.v, solution.a, strict=True)):
         forces.time, forces.v, forces.a = float(t), v, a
         lam = forces.compliant(q)
-        rows = system.dimensionless_jacobian(q)[held]
-        left = forces(q, lam)[0] * system.units
-        lam[held] = -np.linalg.solve(rows.T, left) / system.row_units[held]
-        multipliers[k] = lam
+        left = forces(q, lam)[0] - sum(torque * rows[k] for torque, rows in zip(effort[k], pushed, strict=True))
+        rows = system.dimensionless_jacobian(q)[held].T
+        found, _, ranks[k], _ = np.linalg.lstsq(rows, left * system.units, rcond=_SINGULAR)
+        lam[held] = -found / system.row_units[held]
+        multipliers[k] = lam if ranks[k] == held.size else dependence(system, q).least_norm(lam)
         energies[k] = stored_energy(system.packed, q, v, lam, scratch)[:2]
+    multipliers[ranks < np.max(ranks)] = np.nan
     return replace(solution, multipliers=multipliers, kinetic_energy=energies[:, 0], strain_energy=energies[:, 1])

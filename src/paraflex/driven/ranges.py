@@ -1,20 +1,23 @@
 """Drive of a mechanism: the joint, its range, which ends at limits of reach, and the motion through it."""
 
 import math
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
 from paraflex.arrays import Array
-from paraflex.dynamics import System, assembled_position, dependence
-from paraflex.dynamics.constraints import constraint_count
+from paraflex.dynamics import System, assembled_position
 from paraflex.dynamics.joint_coordinates import joint_value, value_text
-from paraflex.errors import InputError, Moment, UnreachablePathError
+from paraflex.dynamics.soundness import mobility
+from paraflex.dynamics.state import State
+from paraflex.errors import InputError, Moment, UnreachablePathError, listed
 from paraflex.formatting import quantity
-from paraflex.mechanism import ConstantSpeed, Mechanism, PrescribedAngle
-from paraflex.mechanism.quantities import known
+from paraflex.mechanism import Assembly, ConstantSpeed, Mechanism, PrescribedAngle
+from paraflex.mechanism.quantities import finite, known
 from paraflex.paths.loops import LoopClosure, no_long_steps
-from .exact import NO_TASKS, Drive, no_target
+from .exact import NO_TASKS, Drive, follow_past, no_target, width_beside
 from .limits import limit_of_reach
 
 # Fraction of the range between two limits of reach that is left out at either limit, where rates grow without bound.
@@ -30,107 +33,180 @@ _STEP = 1.0 / 360.0
 _GIVE_RANGE = "give the start and end of its travel"
 
 
-def chosen_drive(
-    mechanism: Mechanism, joint: str | None, start: float | None, end: float | None, speed: float | None,
-    system: System, pose: Array,
-) -> Drive | None:  # fmt: skip
+class JointDrive(PrescribedAngle):
+    """Prescribed motion of a joint that drives the mechanism, or is held, without a table of the model."""
+
+    @property
+    def place(self) -> str:
+        """Name of the motion in messages."""
+        return f"drive {self.joint}"
+
+
+class Wish(NamedTuple):
+    """Arguments of a motion: see `kinematics`."""
+
+    drive: str | None
+    held: Mapping[str, float]
+    start: float | None
+    end: float | None
+    speed: float | None
+    duration: float | None
+
+    @property
+    def of_drive(self) -> str:
+        """Name of an argument that only a motion of constant speed has; empty if none is given."""
+        return next((name for name in ("held", "start", "end", "speed") if getattr(self, name) not in (None, {})), "")
+
+
+def chosen_drive(mechanism: Mechanism, wish: Wish, freedoms: int, system: System, pose: Array) -> Drive | None:
     """Return the drive of constant speed; None if the mechanism's own prescribed motions act as they are."""
-    prescribed = mechanism.prescribed
-    steady = [one for one in prescribed if isinstance(one.profile, ConstantSpeed)]
-    given = next((name for name, value in (("start", start), ("end", end), ("speed", speed)) if value is not None), "")
+    joint, prescribed = wish.drive, mechanism.prescribed
+    for held, value in wish.held.items():
+        _check_joint(mechanism, held, "held")
+        finite(value, f"held.{held}")
+    steady = [one for one in prescribed if isinstance(one.profile, ConstantSpeed) and one.joint not in wish.held]
     if joint is None and (len(steady) != 1 or len(prescribed) != 1):
-        moving = [one.name for one in mechanism.joints if one.moves]
-        motors = [motor.joint for motor in mechanism.motors] or moving
-        if prescribed and not given:
+        moving = [one.name for one in mechanism.joints if one.moves and one.name not in wish.held]
+        motors = [motor.joint for motor in mechanism.motors if motor.joint not in wish.held] or moving
+        if prescribed and not wish.of_drive:
             return None
-        free = 3 * len(mechanism.bodies) - constraint_count(replace(mechanism, prescribed=()))
-        if free > 1 or not moving:
+        if wish.held and len(wish.held) >= freedoms:
             raise InputError(
-                f"{free} degrees of freedom need as many prescribed motions" if moving else "no joint moves",
-                field="drive", value=len(prescribed) if moving else None,
-                remedy="add a [prescribed.NAME] table for each; start, end and speed are for one drive"
-                if moving else "flexures move by bending: paraflex statics",
+                "nothing moves where all degrees of freedom are held", field="held", value=", ".join(wish.held),
+                remedy="name a joint that moves without a value",
             )  # fmt: skip
-        if prescribed or len(motors) != 1:
-            also = "; paraflex run plans a motion along a path" if mechanism.end_effector else ""
+        if not moving:
+            raise InputError("no joint moves", field="drive", remedy="flexures move by bending: paraflex statics")
+        if prescribed or len(motors) != 1 or freedoms > 1 + len(wish.held):
+            hold = "" if freedoms < 2 else f", and {freedoms - 1} to hold, {_held_text(mechanism, motors[-1:])}"
             raise InputError(
-                "is missing", field="drive",
-                remedy=f"name the joint that drives the mechanism: {', '.join(moving)}{also}",
-            )  # fmt: skip
+                "is missing", field="drive", remedy=f"name the joint that drives the mechanism: {listed(moving)}{hold}"
+            )
         joint = motors[0]
     elif joint is None:
         joint = steady[0].joint
-    known(joint, [one.name for one in mechanism.joints], "drive", "joint")
+    _check_joint(mechanism, joint, "drive")
+    if joint in wish.held:
+        raise InputError("one joint both moves and is held", field="drive", value=joint, remedy="leave one of them out")
     one = mechanism.joint(joint)
-    one.check_moves("drive")
     before = next((each for each in prescribed if each.joint == joint), None)
     profile = None if before is None else before.profile
     steadily = profile if isinstance(profile, ConstantSpeed) else None
     unit = "m" if one.slides else "rad"
+    speed = wish.speed
     if speed is None:
         speed = abs(steadily.speed) if steadily is not None and steadily.speed else 1.0
     if not _SLOWEST < speed < 1.0 / _SLOWEST:
         problem = "of no machine" if speed > 0.0 else "not positive"
         remedy = f"give it in {unit}/s; the range from start to end gives the direction"
         raise InputError(problem, field="speed", value=speed, remedy=remedy)
-    backwards = steadily is not None and steadily.speed < 0.0
-    if start is None:
-        start = joint_value(system, joint, pose)
+    start = joint_value(system, joint, pose) if wish.start is None else wish.start
     turn = 2.0 * math.pi if unit == "rad" else _LONGEST_TRAVEL * system.size
-    if end is not None and end == start:
-        raise InputError("the drive does not move", field="end", value=end, remedy="give another value than the start")
-    last = start + (-turn if backwards else turn) if end is None else end
-    found = Drive(joint if before is None else before.name, joint, start, last, speed, unit)
-    if found.turns > _MOST_TURNS or max(abs(start), abs(last)) > _MOST_TURNS * max(turn, 2.0 * math.pi):
-        example = {"rad": "90 deg", "m": "50 mm"}[unit]
+    if wish.end is not None and wish.duration is not None:
         raise InputError(
-            f"more than {_MOST_TURNS:g} turns" if unit == "rad" else "too far", field="start" if end is None else "end",
-            value=start if end is None else end, remedy=f'in another unit? It is in {unit}, or write "{example}"',
+            "has no effect where the end of the drive is given", field="duration", value=wish.duration,
+            remedy="leave one of them out: the speed gives the time",
+        )  # fmt: skip
+    if wish.end is not None and wish.end == start:
+        remedy = "give another value than the start"
+        raise InputError("the drive does not move", field="end", value=wish.end, remedy=remedy)
+    travel = turn if wish.duration is None else speed * wish.duration
+    backwards = steadily is not None and steadily.speed < 0.0
+    last = start + (-travel if backwards else travel) if wish.end is None else wish.end
+    own = joint if all(each.name != joint for each in prescribed) else f"{joint} drive"
+    found = Drive(own if before is None else before.name, joint, start, last, speed, unit, held=dict(wish.held))
+    if found.turns > _MOST_TURNS or max(abs(start), abs(last)) > _MOST_TURNS * max(turn, 2.0 * math.pi):
+        field = "duration" if wish.duration is not None else "start" if wish.end is None else "end"
+        example = {"rad": "90 deg", "m": "50 mm"}[unit]
+        remedy = f'in another unit? It is in {unit}, or write "{example}"' if field != "duration" else "give less"
+        raise InputError(
+            f"more than {_MOST_TURNS:g} turns" if unit == "rad" else "too far", field=field,
+            value=getattr(wish, field), remedy=remedy,
         )  # fmt: skip
     return found
 
 
-def driven_loops(mechanism: Mechanism, pose: Array, end: float) -> tuple[LoopClosure, Array]:
+def _check_joint(mechanism: Mechanism, name: str, field: str) -> None:
+    """Check that a drive is a joint that moves."""
+    names = [one.name for one in mechanism.joints]
+    on_body = [one.name for one in mechanism.joints if name in (one.a.body, one.b.body)]
+    at = [one.joint for one in (*mechanism.motors, *mechanism.prescribed) if one.name == name]
+    if name not in names and (on_body or at):
+        remedy = f"name one of its joints: {', '.join(on_body or at)}"
+        raise InputError("not a joint", field=field, value=name, remedy=remedy)
+    known(name, names, field, "joint")
+    mechanism.joint(name).check_moves(field)
+
+
+def _held_text(mechanism: Mechanism, joints: Sequence[str]) -> str:
+    """Return an example of a joint that is held, for the command line and Python."""
+    name = next(iter(joints), "JOINT")
+    value = "50 mm" if joints and mechanism.slides(name) else "30 deg"
+    return f'as --drive "{name}={value}" (held={{...}} in Python)'
+
+
+def freedoms_at(mechanism: Mechanism, assembly: Assembly) -> tuple[int, Array]:
+    """Return the degrees of freedom without prescribed motions, and the closed pose of an assembly."""
+    loops = LoopClosure(replace(mechanism, prescribed=()), 0.0, None, NO_TASKS)
+    pose = loops.assembled(assembly)
+    found = mobility(loops.system, State(0.0, pose, np.zeros(loops.system.n)))
+    return found.nearby_freedoms or found.freedoms, pose
+
+
+def check_determined(mechanism: Mechanism, freedoms: int) -> None:
+    """Check that there are as many prescribed motions as degrees of freedom."""
+    open_ones = freedoms - len(mechanism.prescribed)
+    driven = [each.joint for each in mechanism.prescribed]
+    if open_ones > 0:
+        one, several = "1 degree of freedom", f"{open_ones} degrees of freedom"
+        left = [each.joint for each in mechanism.motors if each.joint not in driven]
+        left = left or [each.name for each in mechanism.joints if each.moves and each.name not in driven]
+        raise InputError(
+            f"the drives leave {one if open_ones == 1 else several} of the mechanism open", field="drive",
+            value=", ".join(driven) or None, remedy=f"hold as many other joints, {_held_text(mechanism, left)}",
+        )  # fmt: skip
+    if open_ones < 0:
+        raise InputError(
+            f"{len(driven)} drives, where the mechanism has {freedoms} degree{'s' * (freedoms != 1)} of freedom",
+            field="drive", value=", ".join(driven), remedy="leave a drive out, or a joint that blocks the mechanism",
+        )  # fmt: skip
+
+
+def driven_loops(mechanism: Mechanism, pose: Array, end: float, freedoms: int) -> tuple[LoopClosure, Array]:
     """Return the closure of a mechanism moved by its prescribed motions, and the pose at their start."""
+    check_determined(mechanism, freedoms)
     loops = LoopClosure(mechanism, end, None, NO_TASKS)
-    system = loops.system
-    pose = assembled_position(system, loops.signals, 0.0, pose)
-    free = system.n - system.m
-    if free > 0:
-        one, several = "1 degree of freedom", f"{free} degrees of freedom"
-        raise InputError(
-            f"the drives leave {one if free == 1 else several} of the mechanism open", field="drive",
-            value=", ".join(each.joint for each in mechanism.prescribed) or None,
-            remedy="kinematics needs as many drives as degrees of freedom: add [prescribed] motions",
-        )  # fmt: skip
-    if free < 0:
-        found = dependence(system, pose)
-        names = ", ".join(dict.fromkeys(system.rows[row] for row in found.dropped))
-        raise InputError(
-            f"more constraints and drives than degrees of freedom; redundant: {names}", field="joint",
-            remedy="leave out the joint or drive whose constraints follow from the others",
-        )  # fmt: skip
-    return loops, pose
+    return loops, assembled_position(loops.system, loops.signals, 0.0, pose)
 
 
-def _with_drive(mechanism: Mechanism, law: Drive) -> Mechanism:
+def _with_drive(mechanism: Mechanism, law: Drive, freedoms: int) -> Mechanism:
     """Return the mechanism with a drive instead of the prescribed motion, and of a motor, at the same joint.
 
-    Other prescribed motions are left out if the mechanism has one degree of freedom. Motors with actuators stay, as
-    their rotors have inertia.
+    Other joints are held; other prescribed motions are left out if they are more than the degrees of freedom. Motors
+    with actuators stay, as their rotors have inertia.
     """
+    moved = (law.joint, *law.held)
     if not mechanism.actuators:
-        motors = tuple(one for one in mechanism.motors if one.joint != law.joint)
+        motors = tuple(one for one in mechanism.motors if one.joint not in moved)
         mechanism = replace(mechanism, motors=motors, modes=())
-    others = tuple(one for one in mechanism.prescribed if one.joint != law.joint)
-    if 3 * len(mechanism.bodies) - constraint_count(replace(mechanism, prescribed=())) < 1 + len(others):
+    others = tuple(one for one in mechanism.prescribed if one.joint not in moved)
+    if freedoms < len(moved) + len(others):
         others = ()
-    return replace(mechanism, prescribed=(PrescribedAngle(law.name, law.joint, law.profile), *others))
+    names = {one.joint: one.name for one in mechanism.prescribed}
+    drive = PrescribedAngle if law.joint in names else JointDrive
+    taken = {one.name for one in others}
+    held = tuple(
+        JointDrive(joint if joint not in taken else f"{joint} held", joint, ConstantSpeed(value, 0.0))
+        for joint, value in law.held.items()
+    )
+    return replace(mechanism, prescribed=(drive(law.name, law.joint, law.profile), *held, *others))
 
 
-def ranged(mechanism: Mechanism, law: Drive, pose: Array, *, fixed: bool) -> tuple[LoopClosure, Array, Drive]:
+def ranged(
+    mechanism: Mechanism, law: Drive, pose: Array, freedoms: int, *, fixed: bool
+) -> tuple[LoopClosure, Array, Drive]:
     """Return closure, first pose and drive; without a given end the range is a turn or lies between two limits."""
-    loops, pose = driven_loops(_with_drive(mechanism, law), pose, law.duration)
+    loops, pose = driven_loops(_with_drive(mechanism, law, freedoms), pose, law.duration, freedoms)
     if fixed or (stopped := _reached(loops, law, pose)) is None:
         if not fixed and law.unit == "m":
             raise InputError(
@@ -139,7 +215,7 @@ def ranged(mechanism: Mechanism, law: Drive, pose: Array, *, fixed: bool) -> tup
         return loops, pose, law
     ends = []
     for way in (law, replace(law, end=2.0 * law.start - law.end)):
-        there = LoopClosure(_with_drive(mechanism, way), way.duration, None, NO_TASKS)
+        there = _closure(mechanism, way, freedoms)
         stopped = _reached(there, way, pose)
         limit = None if stopped is None else limit_of_reach(there.system, law.joint, stopped)
         if limit is None:
@@ -149,29 +225,36 @@ def ranged(mechanism: Mechanism, law: Drive, pose: Array, *, fixed: bool) -> tup
     reach, inside = (low, high), _MARGIN * (high - low)
     span = (low + inside, high - inside) if law.end > law.start else (high - inside, low + inside)
     back = replace(law, end=span[0])
-    there = LoopClosure(_with_drive(mechanism, back), max(back.duration, 1e-6), None, NO_TASKS)
     if span[0] != law.start:
-        pose = followed(there, np.array([0.0, back.duration]), pose, back)[1][-1]
+        there = _closure(mechanism, back, freedoms)
+        pose = followed(there, np.array([0.0, back.duration]), pose, back)[0][1][-1]
     law = replace(law, start=span[0], end=span[1], reach=reach)
-    return LoopClosure(_with_drive(mechanism, law), law.duration, None, NO_TASKS), pose, law
+    return _closure(mechanism, law, freedoms), pose, law
+
+
+def _closure(mechanism: Mechanism, law: Drive, freedoms: int) -> LoopClosure:
+    return LoopClosure(_with_drive(mechanism, law, freedoms), max(law.duration, 1e-6), None, NO_TASKS)
 
 
 def _reached(loops: LoopClosure, law: Drive, pose: Array) -> Array | None:
     """Return the last pose with closed loops before the end of a drive's travel; None if it covers all of it."""
     times = np.linspace(0.0, law.duration, 181)
-    found = loops.follow(no_target, times, np.ones(times.size, dtype=bool), pose.copy())
+    keep = np.ones(times.size, dtype=bool)
+    found, _ = follow_past(loops, no_target, times, keep, pose, width_beside(law, law.duration))
     return None if found.closed else found.last
 
 
-def followed(loops: LoopClosure, times: Array, pose: Array, law: Drive | None = None) -> tuple[Array, ...]:
-    """Return times, coordinates, velocities and accelerations along the whole motion."""
+def followed(
+    loops: LoopClosure, times: Array, pose: Array, law: Drive | None = None
+) -> tuple[tuple[Array, ...], tuple[float, ...]]:
+    """Return times, coordinates, velocities and accelerations along the whole motion, and times of change points."""
     grid, keep = times, np.ones(times.size, dtype=bool)
     if law is not None:
         grid, keep = no_long_steps(times, _STEP * law.duration / max(law.turns, 1.0))
-    found = loops.follow(no_target, grid, keep, pose.copy())
+    found, passed = follow_past(loops, no_target, grid, keep, pose, width_beside(law, float(times[-1])))
     if not found.closed:
         raise _barred(law, loops, found.last, found.stopped)
-    return found.arrays[:4]
+    return found.arrays[:4], tuple(passed)
 
 
 def _barred(law: Drive | None, loops: LoopClosure, last: Array | None, stopped: float | None) -> UnreachablePathError:

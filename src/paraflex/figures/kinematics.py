@@ -46,11 +46,13 @@ def _joints(data: xr.Dataset, found: Found, title: str, unit: str) -> Table:
     """Return the table of the ranges of joints with coordinates in a unit that move, sharp where they reverse."""
     key, where, place_unit = _place(found)
     rows, coordinates = [], data["joint_coordinate"]
+    # Smaller travels are rounding beside the ranges of points.
+    size = 1.0 if unit == "rad" else float(np.max(np.ptp(data["point_position"].values, axis=0), initial=0.0))
     places = data["time"].values if found["drive"] is None else coordinates.sel(joint=where).values
     for joint in names_of(data, "joint"):
         values = coordinates.sel(joint=joint).values
         values = np.where(np.abs(values) < _SAME * np.ptp(values), 0.0, values)
-        if found["joint_units"].get(joint) != unit or not np.ptp(values) > _SAME:
+        if found["joint_units"].get(joint) != unit or not np.ptp(values) > _SAME * size:
             continue
         ends = [(float(values[k]), float(places[k])) for k in (int(np.argmin(values)), int(np.argmax(values)))]
         ends += [(end["value"], end[key]) for end in found["dead_points"].get(joint, ())]

@@ -23,6 +23,8 @@ _IN_UNITS = re.compile(rf"\bin ({_SI}(?:(?:,|,? (?:or|and)) {_SI})*)(?=[\s,.)]|$
 _AND = re.compile(r" and |, (?!or\b)")
 # Tables of numbers by user-defined names, and tables of values whose fields belong to another file.
 _OF_ANY_UNIT = ("parameters", "set")
+# Quantities in messages, by their SI unit.
+_EXAMPLES = {"rad": "90 deg", "m": "50 mm", "rad/s": "60 rpm", "m/s": "20 mm/s", "s": "500 ms"}
 _WHERE_IT_TURNS = {slides: turns for turns, slides in WHERE_IT_SLIDES.items()}
 
 
@@ -155,7 +157,7 @@ def check_unit(
 
 
 def number_in(text: str, unit: str) -> float:
-    """Return the number in a text in an SI unit; the text has no unit, or one of the same dimension.
+    """Return the number in a text in an SI unit, or without one; the text has no unit, or one of the same dimension.
 
     Raises
     ------
@@ -164,9 +166,12 @@ def number_in(text: str, unit: str) -> float:
     """
     try:
         number = evaluate(text, {})
-    except ExpressionError as error:
-        raise InputError("not a number", field="value", value=text, remedy=error.remedy) from None
-    check_unit(text, {}, (unit,), "value", f"it in {unit}")
+    except ExpressionError:
+        remedy = f'write a number in {unit}, or one with its unit, such as "{_EXAMPLES.get(unit, f"2 {unit}")}"'
+        if not unit:
+            remedy = "write a number without a unit, such as 0.02"
+        raise InputError("not a number", field="value", value=text, remedy=remedy) from None
+    check_unit(text, {}, (unit,) if unit else (), "value", f"it in {unit}" if unit else "a ratio")
     return number
 
 
@@ -296,5 +301,5 @@ def _resolve(annotation: Any, data: Any) -> Any:
             kind = model.model_fields.get("type")
             if kind is not None and data.get("type") in typing.get_args(kind.annotation):
                 return model
-        return max(models, key=lambda model: len(set(model.model_fields) & set(data)))
+        return max(models, key=lambda one: (len(set(one.model_fields) & set(data)), -len(one.model_fields)))
     return models[0]

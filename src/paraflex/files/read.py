@@ -27,6 +27,11 @@ _NO_BRACKETS = re.compile(r"\"[^\"]*\"|'[^']*'|#.*")
 _DEEP_KEY = re.compile(rf"""(?<![\w"'.-])(?:[\w"'-]+[ \t]*\.[ \t]*){{{KEY_PARTS}}}""")
 # Field that selects the kind of a table, in every file.
 _TAG = "type"
+# Words of other programs for kinds of joints and for fields.
+_WORDS = {
+    "slider": "prismatic", "hinge": "revolute", "pin": "revolute", "fixed": "weld", "link": "distance",
+    "axis": "direction", "rpm": "speed", "omega": "speed",
+}  # fmt: skip
 _NO_TABLE = ("dict_type", "model_type", "model_attributes_type")
 
 T = typing.TypeVar("T", bound=BaseModel)
@@ -219,7 +224,8 @@ def _first_problem(schema: type[BaseModel], data: dict[str, Any], error: Validat
         return InputError("is missing", field=field, remedy=f"give {description}")
     if kind == "extra_forbidden":
         known = sorted(model.model_fields) if model is not None else []
-        remedy = _above(schema, str(location[-1])) or suggestion(location[-1], known)
+        name = str(location[-1])
+        remedy = _above(schema, name) or suggestion(_WORDS[name] if _WORDS.get(name) in known else name, known)
         return InputError("unknown field", field=field, value=value, remedy=remedy)
     if kind in ("union_tag_invalid", "union_tag_not_found"):
         return _tag_problem(_tags(schema, problem["loc"]), field, value)
@@ -231,7 +237,8 @@ def _first_problem(schema: type[BaseModel], data: dict[str, Any], error: Validat
         return InputError("should be a table", field=field, value=value, remedy=f"give {description}")
     if kind == "literal_error":
         allowed = problem.get("ctx", {}).get("expected", "")
-        near = get_close_matches(str(value), re.findall("'([^']*)'", allowed), n=1)
+        known = re.findall("'([^']*)'", allowed)
+        near = [_WORDS[value]] if _WORDS.get(str(value)) in known else get_close_matches(str(value), known, n=1)
         remedy = f'did you mean "{near[0]}"?' if near else f"give {description}"
         return InputError(f"should be {allowed}", field=field, value=value, remedy=remedy)
     message = problem["msg"].removeprefix("Input ").replace(" after validation", "")

@@ -386,18 +386,14 @@ class BeamTable(_table_of(FlexibleBeam, BODY_KINDS, reference=ReferenceName | No
 
 
 class RigidTable(_table_of(RigidBody, BODY_KINDS)):
-    """A rigid body, also if its table has points, no `type`, and only fields of rigid bodies."""
+    """A rigid body, also if its table has points, no `type`, and no fields of other bodies."""
 
 
 def _with_type(value: Any) -> Any:
-    if (
-        isinstance(value, dict)
-        and "points" in value
-        and "type" not in value
-        and value.keys() <= RigidTable.model_fields.keys()
-    ):
-        return {"type": "rigid"} | value
-    return value
+    if not isinstance(value, dict) or "points" not in value or "type" in value:
+        return value
+    others = {name for table in (BeamTable, AssumedModesTable, ModalTable) for name in table.model_fields}
+    return value if value.keys() & (others - RigidTable.model_fields.keys()) else {"type": "rigid"} | value
 
 
 class AssumedModesTable(_table_of(AssumedModesBeam, BODY_KINDS)):

@@ -155,7 +155,7 @@ def _largest_loads(system: System, solution: Solution) -> Iterator[tuple[str, st
         yield "the force in a joint", "N", largest
     for one, effort in zip(system.mechanism.prescribed, drive_torques(system, multipliers).T, strict=True):
         unit = "N" if system.mechanism.slides(one.joint) else "N m"
-        yield f"the {'force' if unit == 'N' else 'torque'} of prescribed.{one.name}", unit, np.abs(effort)
+        yield f"the {'force' if unit == 'N' else 'torque'} of {one.place}", unit, np.abs(effort)
 
 
 def _largest(loads: Callable[..., Array], motion: Sequence[Array], width: int) -> Array:

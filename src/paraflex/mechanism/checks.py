@@ -232,4 +232,5 @@ def known_point(mechanism: Members, ref: PointRef, field: str) -> None:
     points = mechanism.points
     known(ref.body, points, field, "body")
     if ref.point not in points[ref.body]:
-        raise InputError("unknown point", field=field, value=str(ref), remedy=suggestion(ref.point, points[ref.body]))
+        remedy = suggestion(ref.point, points[ref.body]) if points[ref.body] else "add it to the table [ground]"
+        raise InputError("unknown point", field=field, value=str(ref), remedy=remedy)

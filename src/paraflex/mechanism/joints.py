@@ -270,8 +270,13 @@ class PrescribedAngle(CheckedFields):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        with within(f"prescribed.{self.name}"):
+        with within(self.place):
             check_motion(self.profile)
+
+    @property
+    def place(self) -> str:
+        """Name of the motion in messages."""
+        return f"prescribed.{self.name}"
 
 
 @dataclass(frozen=True)

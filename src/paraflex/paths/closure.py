@@ -270,18 +270,14 @@ class PathClosure(LoopClosure):
         self.reach: PoseSearch = PoseSearch(self.system, effector.point, self.coordinates, self.signals)
 
     def check_degrees_of_freedom(self, assembly: Assembly) -> None:
-        """Check that there are as many task coordinates as degrees of freedom, and no redundant rows."""
+        """Check that there are as many task coordinates as degrees of freedom."""
         free, tasks, repeated = self.system.n - self.system.n_constraints, self.coordinates.size, []
         if free == tasks:
             return
         with suppress(NumericalError):
             repeated = redundant_rows(self.system, self.assembled(assembly))
         if free + len(repeated) == tasks:
-            raise InputError(
-                f"redundant constraints ({', '.join(repeated)}): the joint motion along a path needs independent ones",
-                field="joint",
-                remedy="leave out the joint, gear or link whose constraints follow from the others",
-            )
+            return
         raise InputError(
             f"the mechanism has {free + len(repeated)} degrees of freedom, its task {tasks} coordinate(s)",
             field="end_effector.coordinates",

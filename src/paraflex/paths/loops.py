@@ -15,9 +15,10 @@ from paraflex.kernel.closure import LOOPS_CLOSED, LOOPS_SINGULAR, close_path, ma
 from paraflex.kernel.packed import MARKER, PackedSystem, Signals
 from paraflex.limits import INSTANTS
 from paraflex.mechanism import Assembly, Mechanism, PointRef, with_actuators
-from .sparse_closure import SparseClosure
+from .sparse_closure import RedundantClosure, SparseClosure
 
-# Number of pieces of a step that is too long, divided repeatedly down to the shortest step [s].
+# Number of pieces of a step that is too long, divided repeatedly down to the shortest step [s], or as a part of
+# a shorter motion.
 _STEP_PIECES, _SHORTEST_STEP = 16, 1e-8
 
 
@@ -81,7 +82,7 @@ class LoopClosure:
         q, v, a = apart((3, k, n))
         basis = apart((k, n, self.coordinates.size))
         q[0] = pose
-        if self.system.m > DENSE_ROWS:
+        if self.system.m > DENSE_ROWS or self.redundant:
             return *self._sparse.run(times, target, q, v, a, basis), (q, v, a, basis)
         scratch = make_closure_scratch(self.packed, self.coordinates.size, self.signals.start.size)
         given = (self.packed, self.signals, self.marker, self.coordinates, times, target)
@@ -102,11 +103,11 @@ class LoopClosure:
         pose : (n,) array
             Pose near the first instant.
         """
-        intervals = []
+        intervals, shortest = [], _SHORTEST_STEP * min(1.0, float(grid[-1] - grid[0]) or 1.0)
         while True:
             status, index, found = self.run(grid, target(grid), pose)
             last = index - 1
-            if status in (LOOPS_CLOSED, LOOPS_SINGULAR) or last < 0 or grid[index] - grid[last] < _SHORTEST_STEP:
+            if status in (LOOPS_CLOSED, LOOPS_SINGULAR) or last < 0 or grid[index] - grid[last] < shortest:
                 break
             # Continue from the last instant reached, in shorter steps.
             intervals.append([x[:last][keep[:last]] for x in (grid, *found)])
@@ -119,9 +120,15 @@ class LoopClosure:
         stopped = float(grid[min(index, grid.size - 1)])
         return ClosedLoops((t, q, v, a, basis), status == LOOPS_CLOSED, stopped, pose if last < 0 else found[0][last])
 
+    @property
+    def redundant(self) -> bool:
+        """Whether there are more constraints and task coordinates than coordinates."""
+        return self.system.n_constraints + self.coordinates.size > self.system.n
+
     @cached_property
     def _sparse(self) -> SparseClosure:
-        return SparseClosure(self.system, self.packed, self.signals, self.marker, self.coordinates)
+        kind = RedundantClosure if self.redundant else SparseClosure
+        return kind(self.system, self.packed, self.signals, self.marker, self.coordinates)
 
 
 def no_long_steps(times: Array, longest: float) -> tuple[Array, Mask]:

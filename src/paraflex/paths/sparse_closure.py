@@ -1,5 +1,6 @@
 """Closure of large mechanisms along a path: the method of `kernel.closure` with sparse factors."""
 
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -17,6 +18,8 @@ _LARGEST_CHANGE = 1.0 / 3.0
 # Residual of closed loops, as a fraction of the largest coordinate: a few roundings. The size of a step is no measure,
 # as long rows of loops multiply rounding errors by more than their number.
 _ROUNDING = 1e-15
+# Residual of redundant constraints beyond which they contradict one another [sizes of the mechanism, rad].
+_CONTRADICTION = 1e-10
 
 
 class SparseClosure:
@@ -68,7 +71,7 @@ class SparseClosure:
         units[np.arange(3), self._own] = 1.0
         rates = np.transpose([self._task(q, unit)[1] for unit in units])
         data = self._scale * np.concatenate([jacobian_values(self._system, q), rates.ravel()])[self._order]
-        return scipy.sparse.csc_matrix((data, self._rows, self._starts), shape=(q.size, q.size))
+        return scipy.sparse.csc_matrix((data, self._rows, self._starts), shape=(self._row_units.size, q.size))
 
     def _factor(self, jacobian: scipy.sparse.csc_matrix) -> Any:
         """Return the factors of a Jacobian; None at a singular position."""
@@ -137,7 +140,28 @@ class SparseClosure:
         """Compute velocities, accelerations and basis of closed loops, with the factors at their pose."""
         signals, m, tasks = self._signals, self._system.m, self._coordinates.size
         rate = np.concatenate([-self._system.constraints(signals, t, q)[1], target[1]])
-        found = self._solve(factor, np.column_stack([rate, np.eye(q.size, tasks, -m)]))
+        found = self._solve(factor, np.column_stack([rate, np.eye(rate.size, tasks, -m)]))
         v[:], basis[:] = found[:, 0], found[:, 1:]
         second = second_rates(self._system, signals, t, q, v, self._still)
         a[:] = self._solve(factor, np.concatenate([-second, target[2] - self._task(q, v)[2]]))
+
+
+class RedundantClosure(SparseClosure):
+    """Loops closed by least squares, where constraints depend on one another at every pose."""
+
+    def _factor(self, jacobian: scipy.sparse.csc_matrix) -> Any:
+        """Return a solver of least squares with a Jacobian; None at a singular position."""
+        dense = jacobian.toarray()
+        sizes = np.linalg.svd(dense, compute_uv=False)
+        regular = sizes[-1] >= kernel.SINGULAR_PIVOT * sizes[0]
+        return SimpleNamespace(solve=np.linalg.pinv(dense).__matmul__) if regular else None
+
+    def _relative_change(self, factor: Any, change: scipy.sparse.csc_matrix, q: Array) -> float:
+        """Return the norm of the pseudoinverse of `before` times its change: below one, no position is singular."""
+        return float(np.linalg.norm(factor.solve(change.toarray()), np.inf))
+
+    def _close(self, t: float, goal: Array, factor: Any, q: Array) -> int:
+        """Close the loops as `SparseClosure` does; where constraints contradict one another they stay open."""
+        status = super()._close(t, goal, factor, q)
+        gap = self._system.gap(self._system.constraints(self._signals, t, q)[0])
+        return kernel.LOOPS_OPEN if status == kernel.LOOPS_CLOSED and gap > _CONTRADICTION else status

@@ -9,7 +9,7 @@ import numpy as np
 import xarray as xr
 
 from paraflex.arguments import checked_arguments
-from paraflex.figures.kinematics import kinematics_tables
+from paraflex.figures.kinematics import kinematics_of, kinematics_tables
 from paraflex.figures.reduction import reduced_runs
 from paraflex.figures.run_motion import deflections_of
 from paraflex.figures.selection import as_runs, names_of, samples
@@ -57,6 +57,9 @@ def _subtitle(data: xr.Dataset) -> str:
     drives = names_of(data, "drive") if "drive" in data.dims else []
     torques = {str(name): data["applied_torque"].sel(motor=name).values for name in data["motor"].values}
     given = [text_symbol(name) for name, values in torques.items() if np.any(np.nan_to_num(values))]
+    along = kinematics_of(data).get("path")
+    if along:
+        return f"along path {along}" + (f"; torques of {', '.join(given)}" if given else "")
     parts = [*([f"driven by {', '.join(map(text_symbol, drives))}"] if drives else []),
              *([f"given torques of {', '.join(given)}"] if given else [])]  # fmt: skip
     return "; ".join(parts) or "left to its loads"

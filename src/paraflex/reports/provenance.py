@@ -20,7 +20,7 @@ _LINEAR = (
     "results", "model", "modes", "forces", "prescribed", "pose", "at", "along", "path", "assembly", "coordinates",
     "balanced",
 )  # fmt: skip
-_DRIVEN = ("model", "drive", "start", "end", "speed", *_PLAN, "assemblies")
+_DRIVEN = ("model", "drive", "path", "start", "end", "speed", *_PLAN, "assemblies")
 _COMMANDS: Mapping[str, Sequence[str]] = {
     "run": (
         "model", "path", "modes", "controllers", *_PLAN, "tolerance", "tolerance_per", "control", "method", "step",
@@ -30,7 +30,7 @@ _COMMANDS: Mapping[str, Sequence[str]] = {
     "verify": ("model", "path", "modes", "fidelities", "engines", *_PLAN, "tolerance", "method", "segments", *_FRAMES),
     "statics": ("model", "loads", "torques", "moved", "held", "stiffness", "steps", "buckling", "assembly"),
     "kinematics": _DRIVEN,
-    "torques": (*_DRIVEN, "fluctuation"),
+    "torques": (*_DRIVEN, "mode", "fluctuation"),
     "linearise": _LINEAR,
     "reduce": (*_LINEAR, "states", "methods", "until", "error", "basis"),
 }  # fmt: skip

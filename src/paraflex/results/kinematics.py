@@ -4,7 +4,6 @@ import json
 from dataclasses import asdict
 from typing import Any
 
-import numpy as np
 import xarray as xr
 
 from paraflex.driven import DrivenMotion, Flywheel
@@ -32,6 +31,8 @@ def add_kinematics(
     joints = motion.system.mechanism.joints
     found: dict[str, Any] = {
         "drive": None if motion.drive is None else asdict(motion.drive) | {"full_turn": motion.drive.full_turn},
+        "path": motion.path,
+        "mode": motion.mode,
         "joint_units": {one.name: "m" if one.slides else "rad" for one in joints},
         **motion.features.to_dict(),
     }
@@ -42,8 +43,3 @@ def add_kinematics(
     data.attrs[KINEMATICS] = json.dumps(found)
     # The motion is exact to rounding.
     data.attrs.pop("tolerance", None)
-    if np.isnan(motion.solution.multipliers).all():
-        # Without forces these have no value either, where sums of nothing would be zero.
-        for name in ("drive_energy", "motor_energy", "motor_power", "input_power"):
-            if name in data:
-                data[name] = data[name] * np.nan

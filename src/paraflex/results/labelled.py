@@ -159,7 +159,8 @@ def with_totals(data: xr.Dataset) -> xr.Dataset:
         if torque in data:
             power = data[torque] * data[f"{name}_speed"]
             data[f"{name}_power"] = power.transpose(..., "time", name)
-            data[f"{name}_energy"] = abs(power).fillna(0.0).integrate("time")
+            # The energy of powers that are not known is not zero.
+            data[f"{name}_energy"] = abs(power).fillna(0.0).integrate("time").where(power.notnull().any("time"))
             if data.sizes[name]:
                 data["input_power"] = power.sum(name, skipna=False) + data.get("input_power", 0.0)
     return data.assign(largest_stresses(data)) if MOMENT in data else data

@@ -214,7 +214,7 @@ def _profiles(mechanism: Mechanism, size: float, times: Array) -> Iterator[Findi
         except InputError:
             # A profile may be undefined beyond an earlier end of the run; otherwise the run reports the error.
             continue
-        place = f"prescribed.{one.name}"
+        place = one.place
         swing = float(np.ptp(angle)) if np.any(rate > 0.0) and np.any(rate < 0.0) else 0.0
         if abs(angle[0]) > _TURN or swing > 2.0 * _TURN:
             what = f"it swings over {swing:.4g} rad" if swing > 2.0 * _TURN else f"it starts at {angle[0]:.4g} rad"
@@ -228,14 +228,14 @@ def _profiles(mechanism: Mechanism, size: float, times: Array) -> Iterator[Findi
 
 
 def _drives(mechanism: Mechanism) -> Iterator[Finding]:
-    driven = {one.joint: one.name for one in mechanism.prescribed}
+    driven = {one.joint: one.place for one in mechanism.prescribed}
     shared: dict[str, list[str]] = {}
     for motor in mechanism.motors:
         shared.setdefault(motor.joint, []).append(motor.name)
         if motor.joint in driven:
             yield Finding(
                 "motor-prescribed", f"motor.{motor.name}",
-                f"its joint {motor.joint} follows [prescribed.{driven[motor.joint]}] whatever the motor does",
+                f"its joint {motor.joint} follows {driven[motor.joint]} whatever the motor does",
                 "leave one of them out",
             )  # fmt: skip
     for joint, names in shared.items():

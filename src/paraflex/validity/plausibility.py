@@ -151,7 +151,7 @@ def shared_loads(system: System, solution: Solution) -> Iterator[Finding]:
     found = undetermined_loads(system, names, solution.q, solution.acting)
     # Loads have poles at singular configurations.
     regular = np.isfinite(solution.multipliers).any(axis=1)
-    drives = [f"prescribed.{one.name}" for one in system.described.prescribed]
+    drives = [one.place for one in system.described.prescribed]
     forces, moments, drives_too = (
         np.any(found.force[regular], axis=(0, 2)),
         np.any(found.moment[regular], axis=0),
@@ -289,7 +289,7 @@ def _loads(system: System, multipliers: Array) -> dict[tuple[str, str], float]:
     found, drives = load_errors(system, names, multipliers), {}
     for one, load in zip(prescribed, found.drive.tolist(), strict=True):
         what, unit = ("force", "N") if system.mechanism.slides(one.joint) else ("torque", "N m")
-        drives[f"{what} of prescribed.{one.name}", unit] = load
+        drives[f"{what} of {one.place}", unit] = load
     forces = {(f"force in {name}", "N"): load for name, load in zip(names, found.force.tolist(), strict=True)}
     moments = {(f"moment in {name}", "N m"): load for name, load in zip(names, found.moment.tolist(), strict=True)}
     return forces | moments | drives
@@ -399,7 +399,7 @@ def _moving(mechanism: Mechanism, system: System, solution: Solution) -> str:
     for one in mechanism.prescribed:
         rate = float(np.max(np.abs(one.profile.evaluate(solution.t)[1])))
         unit = "m/s" if mechanism.slides(one.joint) else "rad/s"
-        named.append(f"prescribed.{one.name} (up to {speed_text(rate, unit, 3)})")
+        named.append(f"{one.place} (up to {speed_text(rate, unit, 3)})")
     sizes = largest_loads(system, solution.t, solution.q, solution.v)
     named += [f"load.{load.name} ({size:.3g} {load.unit})" for load, size in zip(mechanism.loads, sizes, strict=False)]
     return f": {', '.join(named)}" if named else ""

@@ -152,10 +152,12 @@ class KinematicsRequest:
     """Options of `paraflex kinematics`."""
 
     model: ModelChoice = field(default_factory=ModelChoice)
-    drive: str | None = option(
-        "--drive JOINT",
-        "Joint that moves at constant speed. Default: the prescribed motions, or the only motor's joint.",
+    drive: list[str] = repeatable(
+        "--drive JOINT[=VALUE]",
+        "Joint that moves at constant speed, or one held at a value; repeatable. Default: the prescribed motions, the "
+        "path, or the only motor's joint.",
     )
+    path: str | None = path_option()
     start: str | None = option(
         "--from VALUE", 'First angle or travel of the drive: "-30 deg". Default: the assembly\'s.'
     )
@@ -166,7 +168,9 @@ class KinematicsRequest:
         "--speed VALUE", 'Speed of the drive: "60 rpm". Default: that of its prescribed motion, else 1 rad/s or m/s.'
     )
     duration: float | None = option(
-        "--duration S", "Duration of prescribed motions whose speed changes. Default: the study's.", unit="s"
+        "--duration S",
+        "Duration, of the drive in place of --to. Default: the study's, or the path's.",
+        unit="s",
     )
     samples: int = option("--samples N", "Number of positions.", default=361)
     assembly: str | None = assembly_option()
@@ -178,6 +182,7 @@ class KinematicsRequest:
 class TorquesRequest(KinematicsRequest):
     """Options of `paraflex torques`."""
 
+    mode: str | None = option("--mode MODE", "Actuation mode along a path. Default: the study's first.")
     fluctuation: float | None = option(
         "--fluctuation RATIO", "Range of the speed over its mean for which a flywheel is computed, such as 0.02."
     )

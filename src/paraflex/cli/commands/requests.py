@@ -9,9 +9,10 @@ from __future__ import annotations
 import inspect
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from copy import copy
 from dataclasses import MISSING, Field, field, fields, is_dataclass
 from functools import partial
-from typing import Annotated, Any, get_type_hints
+from typing import Annotated, Any, get_args, get_origin, get_type_hints
 
 import typer
 
@@ -71,9 +72,27 @@ def _measured(unit: str) -> Callable[[Any], float]:
             try:
                 return number_in(text, unit)
             except InputError as error:
-                raise typer.BadParameter(f"{error.problem}: {text!r}; {error.remedy}") from None
+                raise typer.BadParameter(f"{error.problem} (got {text!r}); {error.remedy}") from None
 
     return number
+
+
+def _whole(text: Any) -> int:
+    """Return a whole number, the value of an option."""
+    try:
+        return int(text)
+    except ValueError:
+        raise typer.BadParameter(f"not a whole number (got {text!r}); write it in digits, such as 361") from None
+
+
+def _parsed(info: Any, kind: Any) -> Any:
+    """Return the description of an option, with a parser for the numbers of its type."""
+    parser = {int: _whole, float: _measured("")}.get(next(iter(get_args(kind)), kind))
+    if parser is None or info.parser is not None or get_origin(kind) is list:
+        return info
+    info = copy(info)
+    info.parser = parser
+    return info
 
 
 def with_options(request: type, answer: Callable[[Any], int | None]) -> Callable[..., None]:
@@ -91,7 +110,7 @@ def with_options(request: type, answer: Callable[[Any], int | None]) -> Callable
         # None stands for a default made by a factory.
         default = None if one.default_factory is not MISSING else one.default
         parameters.append(inspect.Parameter(
-            one.name, inspect.Parameter.KEYWORD_ONLY, annotation=Annotated[kind, one.metadata["shell"]],
+            one.name, inspect.Parameter.KEYWORD_ONLY, annotation=Annotated[kind, _parsed(one.metadata["shell"], kind)],
             default=inspect.Parameter.empty if default is MISSING else default,
         ))  # fmt: skip
     called.__signature__ = inspect.Signature(parameters)  # type: ignore[attr-defined]
@@ -102,6 +121,11 @@ def with_options(request: type, answer: Callable[[Any], int | None]) -> Callable
 def flags(request: object) -> dict[str, str]:
     """Return the flag of every option of a request by its field: {"tolerance": "--tol"}."""
     return {one.name: one.metadata["flag"] for one, _ in _options(type(request)) if one.metadata["flag"]}
+
+
+def flags_of(request: type) -> list[str]:
+    """Return the flags of a command by its request."""
+    return [one.metadata["flag"] for one, _ in _options(request)]
 
 
 @contextmanager
