@@ -12,10 +12,10 @@ import pytest
 
 import paraflex as pf
 from flexures import LENGTH, WIDTH, E
-from paraflex.designs.measure import measure, members_of
+from paraflex.designs.measure import measure
 from paraflex.designs.sweep import load_sweep
 from paraflex.files import library_text
-from paraflex.results.metrics import METRICS, STATICS, metric_unit
+from paraflex.results.metrics import MetricMembers, metric_unit
 from shell import paraflex
 
 BASE = 'mechanism = "leaf_spring_guide"\n'
@@ -178,7 +178,7 @@ def test_expressions_take_coordinates_in_all_steps_and_have_their_units():
     }  # fmt: skip
     got = measure(found, list(wanted))
     assert got == pytest.approx(wanted, rel=1e-12)
-    members = members_of(found.system.described, found.equations.conditions)
+    members = MetricMembers(found.system.described, found.equations.conditions)
     assert [metric_unit(name, members) for name in list(wanted)[::3]] == ["m", "N"]
 
 

@@ -6,9 +6,8 @@ from typing import Any
 import numpy as np
 
 from paraflex.arrays import NDArray
-from paraflex.equilibria.conditions import Conditions
 from paraflex.equilibria.result import Statics
-from paraflex.errors import InputError, IntegrationError, Moment, as_enum, suggestion
+from paraflex.errors import InputError, IntegrationError, Moment, as_enum, renamed, suggestion
 from paraflex.integrators.between import COARSE
 from paraflex.mechanism import Mechanism
 from paraflex.mechanism.quantities import all_listed
@@ -16,20 +15,14 @@ from paraflex.motion import MotionRun
 from paraflex.results.following import HEADLINE, ErrorSpan
 from paraflex.results.metrics import (
     ALWAYS,
-    COORDINATE,
-    DIRECTION,
-    DRIVE,
-    JOINT,
     METRICS,
     MOTION,
-    MOTOR,
     PATH,
     STATICS,
     VALIDITY,
-    Members,
+    MetricMembers,
     Metric,
     metric_name,
-    sliding,
 )
 from paraflex.results.run_traces import MotionTraces, RunTraces, StaticsTraces, run_traces
 from paraflex.tracking import TrackingRun
@@ -70,26 +63,12 @@ def check_metric(column: str, field: str = "metrics", known: Sequence[str] = tup
     """
     name = metric_name(column)
     if name not in METRICS:
-        raise InputError("unknown metric", field=field, value=column, remedy=suggestion(name, list(known)))
-
-
-def members_of(mechanism: Mechanism, given: Conditions | None = None) -> Members:
-    """Return the names of the members with one column of a metric each, by kind, and of those that slide.
-
-    The members are motors, drives (prescribed motions) and joints. If `given` holds the conditions of equilibria, they
-    are the named coordinates, and those with a stiffness.
-    """
-    if given is not None:
-        straight = tuple(one.name for one in given.coordinates if one.unit == "m")
-        found = {COORDINATE: given.coordinates, DIRECTION: given.measured}
-        names = {kind: tuple(one.name for one in each) for kind, each in found.items()}
-        return names | {sliding(kind): straight for kind in names}
-    found = {MOTOR: mechanism.motors, DRIVE: mechanism.prescribed, JOINT: mechanism.joints}
-    slides = {joint.name for joint in mechanism.joints if joint.slides}
-    return {kind: tuple(one.name for one in each) for kind, each in found.items()} | {
-        sliding(kind): tuple(one.name for one in each if getattr(one, "joint", one.name) in slides)
-        for kind, each in found.items()
-    }
+        remedy = suggestion(name, list(known))
+        if name != column:
+            remedy += f"; an expression needs a function of the samples, as max(abs({column}))"
+        raise InputError("unknown metric", field=field, value=column, remedy=remedy)
+    with renamed(field, only="metrics"):
+        _ = METRICS[name]
 
 
 def metrics_of(
@@ -120,6 +99,8 @@ def metrics_of(
                 f"a metric of each {metric_of(name).each or 'run'} is kept of all", field="metrics", value=name,
                 remedy=f'write "{metric_of(name).name}"',
             )  # fmt: skip
+        if mechanism is not None and runs != STATICS:
+            METRICS[name].columns(MetricMembers(mechanism))
         if runs not in METRICS[name].runs:
             raise InputError(
                 f"a metric of {' or '.join(_OF_RUNS[each] for each in METRICS[name].runs)}, not of "
@@ -139,9 +120,9 @@ def metrics_of(
 def metric_columns(run: Runs, names: Sequence[str]) -> tuple[str, ...]:
     """Return the columns of metrics: NAME, or NAME.MEMBER for those of each motor, joint or other member."""
     if isinstance(run, Statics):
-        members = members_of(run.system.described, run.equations.conditions)
+        members = MetricMembers(run.system.described, run.equations.conditions)
     else:
-        members = members_of(run.system.described if isinstance(run, MotionRun) else run.task.mechanism)
+        members = MetricMembers(run.system.described if isinstance(run, MotionRun) else run.task.mechanism)
     return tuple(column for name in names for column in METRICS[name].columns(members))
 
 
@@ -200,7 +181,7 @@ def check_smooth(names: Sequence[str]) -> None:
     InputError
         A metric is not differentiable, such as one that describes the integration.
     """
-    all_listed(names, SMOOTH, "metrics", "has no derivative")
+    all_listed([name for name in names if not METRICS[name].smooth], SMOOTH, "metrics", "has no derivative")
 
 
 def beyond_limits(runs: int) -> str:

@@ -11,7 +11,7 @@ from paraflex.designs.run import RunTask
 from paraflex.designs.schema import StudyFile, study_table
 from paraflex.designs.units import check_unit_of_metric
 from paraflex.errors import InputError
-from paraflex.results.metrics import Members
+from paraflex.results.metrics import MetricMembers
 from .evaluate import Evaluate, EvaluatedDesign, Session
 from .minimise import DEFAULT_SEARCH, minimise
 from .objective import Objective
@@ -131,7 +131,7 @@ def optimise(
     return study.run(folder, workers=Workers.of(workers), on_progress=on_progress, run=run)
 
 
-def _objective(table: ObjectiveTable, members: Members) -> Objective:
+def _objective(table: ObjectiveTable, members: MetricMembers) -> Objective:
     if not table.minimise:
         raise InputError("nothing to minimise", field="objective.minimise", remedy="write { tracking_rms = 1.0 }")
     for column, weight in table.minimise.items():
