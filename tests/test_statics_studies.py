@@ -15,7 +15,7 @@ from flexures import LENGTH, WIDTH, E
 from paraflex.designs.measure import measure
 from paraflex.designs.sweep import load_sweep
 from paraflex.files import library_text
-from paraflex.results.metrics import MetricMembers, metric_unit
+from paraflex.results.metrics import METRICS, STATICS, MetricMembers, metric_unit
 from shell import paraflex
 
 BASE = 'mechanism = "leaf_spring_guide"\n'
@@ -187,9 +187,11 @@ def test_expressions_take_coordinates_in_all_steps_and_have_their_units():
     [
         ("max(abs(stage.T.q))", "unknown coordinate (got 'stage.T.q')"),
         ("max(stiffness.stage.T.angle)", "unknown direction (got 'stage.T.angle')"),
-        ("largest(stage.T.y)", "no such expression of a metric (got 'largest(stage.T.y)')"),
-        ("max(abs(stage.T.y)", "no such expression"),
-        ("max(stage.T.y) + 1", "no such expression"),
+        ("largest(stage.T.y)", "unknown function \"largest\" (got 'largest(stage.T.y)')"),
+        ("max(abs(stage.T.y)", "no such expression of a metric (got 'max(abs(stage.T.y)')"),
+        ("max(stage.T.y) + 1", "a sum of a quantity in m and a number without a unit (got 'max(stage.T.y) + 1')"),
+        ("max(stage.T.y) + max(effort.stage.T.x)", "a sum of quantities in m and in N"),
+        ("max(stage.T.y[0:1])", "equilibria have no time"),
     ],
 )
 def test_expressions_that_make_no_sense_are_refused(tmp_path, metric, message):

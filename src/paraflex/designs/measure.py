@@ -65,7 +65,7 @@ def check_metric(column: str, field: str = "metrics", known: Sequence[str] = tup
     if name not in METRICS:
         remedy = suggestion(name, list(known))
         if name != column:
-            remedy += f"; an expression needs a function of the samples, as max(abs({column}))"
+            remedy = f"a quantity of a run needs a function of its samples, as max(abs({column})); else {remedy}"
         raise InputError("unknown metric", field=field, value=column, remedy=remedy)
     with renamed(field, only="metrics"):
         _ = METRICS[name]

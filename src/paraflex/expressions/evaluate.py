@@ -19,6 +19,8 @@ from paraflex.units import UNITS, divisors_in, quantities_in, unknown_unit
 from .jets import FUNCTIONS, Jet
 
 CONSTANTS = {"pi": math.pi}
+# Problem of a text with a syntax error.
+NO_EXPRESSION = "neither a number nor an expression"
 # Name of the time in expressions.
 TIME_NAME = "t"
 _BINARY: dict[type, Callable[[Any, Any], Any]] = {
@@ -242,7 +244,7 @@ def tree_of(text: str) -> ast.AST:
         if unknown is not None:
             raise ExpressionError(f'unknown unit "{unknown[0]}"', unknown[1]) from None
         remedy = 'write it like "l1 - 0.5 * la", or "80 mm" with the unit behind a number'
-        raise ExpressionError("neither a number nor an expression", remedy) from None
+        raise ExpressionError(NO_EXPRESSION, remedy) from None
     except OverflowError:
         raise ExpressionError("too large a number", "check its digits") from None
 

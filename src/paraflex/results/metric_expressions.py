@@ -15,9 +15,9 @@ import numpy as np
 from paraflex.arrays import Indices
 from paraflex.errors import InputError, suggestion
 from paraflex.expressions.dimensions import dimension_in
-from paraflex.expressions.evaluate import CONSTANTS, ExpressionError, arithmetic, names_within, tree_of
+from paraflex.expressions.evaluate import CONSTANTS, NO_EXPRESSION, ExpressionError, arithmetic, names_within, tree_of
 from paraflex.expressions.jets import FUNCTIONS, Jet, sqrt
-from paraflex.units import PLAIN, Dimension, dimension_text, unit_named
+from paraflex.units import ANGLE, PLAIN, Dimension, dimension_text, unit_named
 from .formulas import SAME_TIME
 
 _TIME = unit_named("s").dimension
@@ -95,6 +95,11 @@ class _Call(NamedTuple):
     window: _Window | None
     series: bool
 
+    @property
+    def in_time(self) -> bool:
+        """Whether the value depends on the times of the samples."""
+        return self.name == "integral" or self.window not in (None, _Window())
+
 
 class _Parser(ast.NodeTransformer):
     """Replaces reductions, magnitudes and windows in a syntax tree by names in `calls`."""
@@ -171,6 +176,11 @@ class MetricExpression:
     calls: Mapping[str, _Call]
 
     @property
+    def in_time(self) -> bool:
+        """Whether the metric depends on the times of the samples."""
+        return any(call.in_time for call in self.calls.values())
+
+    @property
     def quantities(self) -> list[str]:
         """Names of the quantities, each once."""
         trees = [self.tree, *(call.argument for call in self.calls.values())]
@@ -188,7 +198,7 @@ class MetricExpression:
         found = self._dimension(self.tree, units)
         if found is None:
             raise ExpressionError("its unit is not known", "take roots of squares, and powers that are whole numbers")
-        named = [unit for unit in units.values() if unit_named(unit).dimension == found]
+        named = [unit for unit in (*units.values(), "W") if unit_named(unit).dimension == found]
         return named[0] if named else dimension_text(found)
 
     def value(self, series: Callable[[str], Jet], t: Callable[[], Jet]) -> Jet:
@@ -208,7 +218,7 @@ class MetricExpression:
                 return abs(found)
             sign = np.sign(found.value)
             return _each(found, lambda values: sign * values)
-        if call.window == _Window() and call.name != "integral":
+        if not call.in_time:
             return REDUCTIONS[call.name](found, found)
         times, inside = t(), call.window.samples(t())
         return REDUCTIONS[call.name](*(_each(each, lambda values: values[inside]) for each in (found, times)))
@@ -222,6 +232,14 @@ class MetricExpression:
                 return found
             return tuple(one + more for one, more in zip(found, _TIME, strict=True))  # type: ignore[return-value]
 
+        for node in ast.walk(tree):
+            if isinstance(node, ast.BinOp) and isinstance(node.op, ast.Add | ast.Sub):
+                one, other = (dimension_in(side, of) for side in (node.left, node.right))
+                summand = other if one == PLAIN else one
+                if PLAIN in (one, other) and summand not in (PLAIN, ANGLE, None):
+                    unit = dimension_text(summand)
+                    raise ExpressionError(f"a sum of a quantity in {unit} and a number without a unit",
+                                          f'write a unit behind the number, as in "0.1 {unit}"')  # fmt: skip
         return dimension_in(tree, of)
 
 
@@ -235,9 +253,15 @@ def parsed(text: str) -> MetricExpression:
         Syntax error, function that does not exist, reduction of a number, or quantity without a reduction.
     """
     parser = _Parser()
-    tree = parser.visit(tree_of(text))
+    try:
+        tree = parser.visit(tree_of(text))
+    except ExpressionError as error:
+        if error.problem != NO_EXPRESSION:
+            raise
+        remedy = "write it like max(abs(body.point.y)), with quotes about 'names-with.other.signs'"
+        raise ExpressionError("no such expression of a metric", remedy) from None
     if not any(call.window for call in parser.calls.values()) or parser.is_series(tree):
-        name = next((name for name in _quantities(tree) if name not in parser.calls), "body.point.y")
+        name = next((name for name in _quantities(tree) if "." in name[1:]), "body.point.y")
         raise ExpressionError("not one number of a run", f"write max(abs({name})), or with another of "
                               f"{', '.join(REDUCTIONS)}")  # fmt: skip
     # Evaluated once, so that elements that are not allowed are refused before any run.

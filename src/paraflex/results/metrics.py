@@ -17,7 +17,7 @@ import numpy as np
 
 from paraflex.equilibria.conditions import Conditions
 from paraflex.errors import InputError
-from paraflex.expressions.evaluate import expressed_in
+from paraflex.expressions.evaluate import ExpressionError, expressed_in
 from paraflex.expressions.jets import Jet
 from paraflex.mechanism import Mechanism, rotor_mass
 from paraflex.mechanism.quantities import known
@@ -96,7 +96,10 @@ class MetricMembers(dict[str, Sequence[str]]):
             if not all(part.isidentifier() for part in name.split(".")):
                 whole = rf"(?<![\w.'\"])((?:{'|'.join(_OF_COORDINATES)})\.)?{re.escape(name)}(?![\w.'\"])"
                 text = re.sub(whole, lambda found: repr(found[0]), text)
-        return parsed(text)
+        found = parsed(text)
+        if COORDINATE in self and found.in_time:
+            raise ExpressionError("equilibria have no time", "leave out windows and integrals")
+        return found
 
 # Function of the traces of a run and of the nominal run. It may use attributes that only some traces have
 # (`RunTraces`).
@@ -196,17 +199,15 @@ def _of_expression(text: str, run: Any, nominal: Any) -> Any:
     members = MetricMembers(nominal.system.described, nominal.conditions)
 
     def jet(of: Callable[[Any, Any], Trace]) -> Jet:
-        there = of(nominal, nominal)
-        rate = np.zeros_like(there) if run is nominal else np.imag(of(run, nominal))
-        return Jet(there, rate, np.zeros_like(there))
+        here = of(run, nominal)
+        value = of(nominal, nominal) if np.iscomplexobj(here) else here
+        return Jet(value, np.imag(here), np.zeros_like(value))
 
-    def times() -> Jet:
-        if nominal.conditions is not None:
-            raise InputError("equilibria have no time", field="metrics", value=text, remedy="leave the window out")
-        return jet(lambda traces, _: traces.solution.t)
-
-    found = members.expression(text).value(lambda name: jet(members.quantity(name).of), times)
-    return found.value if run is nominal else found.value + 1j * found.rate
+    expression = members.expression(text)
+    found = expression.value(
+        lambda name: jet(members.quantity(name).of), lambda: jet(lambda traces, _: traces.solution.t)
+    )
+    return found.value + 1j * found.rate if np.any(found.rate) else found.value
 
 
 class _Metrics(dict[str, Metric]):

@@ -74,8 +74,9 @@ def quantity_named(name: str, mechanism: Mechanism) -> Quantity:
         unit, derivative, axis = _POINT_WORDS[word]
         point = PointRef.parse(owner, "metrics")
         return Quantity(unit, lambda run, _: run.point_motion(point)[derivative][:, axis])
-    raise InputError("no such quantity", field="metrics", value=name,
-                     remedy=suggestion(name, list(_names(mechanism))))  # fmt: skip
+    names = list(_names(mechanism))
+    near = [one for one in names if one.startswith((f"{name}.", f"{owner}."))]
+    raise InputError("no such quantity", field="metrics", value=name, remedy=suggestion(name, near or names))
 
 
 def is_load(name: str) -> bool:
