@@ -601,7 +601,7 @@ def test_of_several_runs_the_one_farthest_from_a_target_counts(tmp_path):
         ('metric = "max(tau1.torqe)"\ntarget = 2.0',
          "objective.targets.0.metric: no such quantity (got 'tau1.torqe'); did you mean \"tau1.torque\"?"),
         ('metric = "max(tau1.torque)"\ntarget = "2 N"',
-         "objective.targets.0.target: a quantity in N where one in N m is asked for (got '2 N'); give max(tau1.torque)"),
+         "objective.targets.0.target: a quantity in N where one in N m is asked for (got '2 N'); give max("),
         ('metric = "total_mass"\nvalue = 2.0', "objective.targets.0.target"),
         ('metric = "total_mass"\ntarget = nan', "objective.targets.0.target"),
     ],

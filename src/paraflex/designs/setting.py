@@ -213,7 +213,7 @@ def make_setting(table: SweepTable, folder: FilePath) -> tuple[Setting, tuple[Sw
         samples=table.samples,
         assembly=table.assembly,
         integration=_integration(table),
-        metrics=metrics_of(table.metrics, model.study.error, model.mechanism, runs),
+        metrics=metrics_of(table.metrics, model.study.error, model.mechanism, runs, table.duration),
         trajectories=table.trajectories,
         versions=versions(),
         text=model.text,

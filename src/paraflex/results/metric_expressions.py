@@ -132,8 +132,9 @@ class _Parser(ast.NodeTransformer):
         inner, part = self.visit(node.value), node.slice
         if not isinstance(part, ast.Slice) or part.step is not None or not self.is_series(inner):
             raise ExpressionError("not a window of time of a quantity", "write it like A1.torque[0.2:0.5], in s")
-        ends = (-np.inf if part.lower is None else _time(part.lower), np.inf if part.upper is None else _time(part.upper))
-        self._windows[-1] = self._windows[-1].within(_Window(*ends))
+        start = -np.inf if part.lower is None else _time(part.lower)
+        end = np.inf if part.upper is None else _time(part.upper)
+        self._windows[-1] = self._windows[-1].within(_Window(start, end))
         return inner
 
     def is_series(self, tree: ast.AST) -> bool:
@@ -157,6 +158,8 @@ def _time(tree: ast.AST) -> float:
     if dimension not in (PLAIN, _TIME):
         unit = "no known unit" if dimension is None else dimension_text(dimension)
         raise ExpressionError(f"a window in {unit}, not in s", "write it like [0.2:0.5] or [200 ms:500 ms]")
+    if not 0.0 <= value < np.inf:
+        raise ExpressionError("a window outside the run", "runs begin at 0 s; leave out an end that is not limited")
     return float(value)
 
 
@@ -179,6 +182,12 @@ class MetricExpression:
     def in_time(self) -> bool:
         """Whether the metric depends on the times of the samples."""
         return any(call.in_time for call in self.calls.values())
+
+    @property
+    def until(self) -> float:
+        """Latest time that a window names [s]; 0 without windows."""
+        ends = [end for call in self.calls.values() for end in call.window or () if np.isfinite(end)]
+        return max(ends, default=0.0)
 
     @property
     def quantities(self) -> list[str]:
@@ -260,12 +269,12 @@ def parsed(text: str) -> MetricExpression:
             raise
         remedy = "write it like max(abs(body.point.y)), with quotes about 'names-with.other.signs'"
         raise ExpressionError("no such expression of a metric", remedy) from None
-    if not any(call.window for call in parser.calls.values()) or parser.is_series(tree):
-        name = next((name for name in _quantities(tree) if "." in name[1:]), "body.point.y")
-        raise ExpressionError("not one number of a run", f"write max(abs({name})), or with another of "
-                              f"{', '.join(REDUCTIONS)}")  # fmt: skip
     # Evaluated once, so that elements that are not allowed are refused before any run.
     ones, whole = Jet.constant(1.0, np.ones(2)), {name: call._replace(window=call.window and _Window())
                                                   for name, call in parser.calls.items()}  # fmt: skip
     MetricExpression(tree, whole).value(lambda _: ones, lambda: ones)
+    if not any(call.window for call in parser.calls.values()) or parser.is_series(tree):
+        name = next((name for name in _quantities(tree) if "." in name[1:]), "body.point.y")
+        raise ExpressionError("not one number of a run", f"write max(abs({name})), or with another of "
+                              f"{', '.join(REDUCTIONS)}")  # fmt: skip
     return MetricExpression(tree, parser.calls)

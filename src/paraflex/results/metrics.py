@@ -7,6 +7,7 @@ a magnitude has, so that the formula consists of sums, products and roots only.
 
 from __future__ import annotations
 
+import json
 import re
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -14,9 +15,9 @@ from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import xarray as xr
 
 from paraflex.equilibria.conditions import Conditions
-from paraflex.errors import InputError
 from paraflex.expressions.evaluate import ExpressionError, expressed_in
 from paraflex.expressions.jets import Jet
 from paraflex.mechanism import Mechanism, rotor_mass
@@ -24,7 +25,7 @@ from paraflex.mechanism.quantities import known
 from paraflex.units import WHERE_IT_SLIDES
 from .formulas import drift_speed, largest_norm, overshoot, rms, settling_time, vibration
 from .metric_expressions import MetricExpression, parsed
-from .motion_quantities import Quantity, is_load, quantity_named
+from .motion_quantities import JOINT_LOADS, MOTOR_WORDS, Quantity, is_load, quantity_named
 from .stress import stress_at
 from .traces import Trace
 
@@ -64,10 +65,13 @@ class MetricMembers(dict[str, Sequence[str]]):
             return
         found = {MOTOR: mechanism.motors, DRIVE: mechanism.prescribed, JOINT: mechanism.joints}
         slides = {joint.name for joint in mechanism.joints if joint.slides}
-        super().__init__({kind: tuple(one.name for one in each) for kind, each in found.items()} | {
-            sliding(kind): tuple(one.name for one in each if getattr(one, "joint", one.name) in slides)
-            for kind, each in found.items()
-        })
+        super().__init__(
+            {kind: tuple(one.name for one in each) for kind, each in found.items()}
+            | {
+                sliding(kind): tuple(one.name for one in each if getattr(one, "joint", one.name) in slides)
+                for kind, each in found.items()
+            }
+        )
 
     def quantity(self, name: str) -> Quantity:
         """Return a quantity of the runs by its name; of equilibria the travel of a coordinate unless it says another.
@@ -100,6 +104,7 @@ class MetricMembers(dict[str, Sequence[str]]):
         if COORDINATE in self and found.in_time:
             raise ExpressionError("equilibria have no time", "leave out windows and integrals")
         return found
+
 
 # Function of the traces of a run and of the nominal run. It may use attributes that only some traces have
 # (`RunTraces`).
@@ -228,6 +233,31 @@ class _Metrics(dict[str, Metric]):
 def metric_name(column: str) -> str:
     """Return the metric of a column: NAME for NAME.MEMBER, the text itself for an expression."""
     return column if "(" in column else column.partition(".")[0]
+
+
+def keep_metrics(data: xr.Dataset, figures: Mapping[str, Any]) -> None:
+    """Store values and units of metrics by name of the run, which is empty for a single one, in a dataset."""
+    data.attrs["metrics"] = json.dumps(figures)
+
+
+def kept_metrics(data: xr.Dataset, run: str = "") -> dict[str, Any]:
+    """Return `metrics` with what `keep_metrics` stored of a run; empty if nothing was stored."""
+    found = json.loads(data.attrs.get("metrics", "{}")).get(run)
+    return {"metrics": found} if found else {}
+
+
+def metric_until(name: str) -> float:
+    """Return the latest time that the windows of a metric by expression name [s]; 0 for other metrics."""
+    return parsed(name).until if "(" in name else 0.0
+
+
+def has_loads(name: str, mechanism: Mechanism) -> bool:
+    """Check whether a metric is an expression of loads of joints or beams, or of efforts of prescribed motions."""
+    quantities = [each.rpartition(".")[::2] for each in parsed(name).quantities] if "(" in name else []
+    driven = {place for one in mechanism.prescribed for place in (one.name, one.joint)}
+    return any(
+        word in (*JOINT_LOADS, "stress") or (owner in driven and word in MOTOR_WORDS) for owner, word in quantities
+    )
 
 
 def sliding(each: str) -> str:

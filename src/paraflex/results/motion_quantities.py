@@ -20,13 +20,14 @@ _JOINT_WORDS = {
     "angle": ("rad", ""), "travel": ("", "m"), "rate": ("rad/s", "m/s"), "acceleration": ("rad/s^2", "m/s^2"),
     "force": ("N", "N"), "fx": ("N", "N"), "fy": ("N", "N"), "moment": ("N m", "N m"),
 }  # fmt: skip
-_JOINT_LOADS = ("force", "fx", "fy", "moment")
+# Words of the loads of joints, and of the efforts of motors and prescribed motions.
+JOINT_LOADS = ("force", "fx", "fy", "moment")
+MOTOR_WORDS = ("torque", "force", "power")
 # Words of a point, with unit, derivative in time and axis.
 _POINT_WORDS = {
     "x": ("m", 0, 0), "y": ("m", 0, 1), "vx": ("m/s", 1, 0), "vy": ("m/s", 1, 1), "ax": ("m/s^2", 2, 0),
     "ay": ("m/s^2", 2, 1),
 }  # fmt: skip
-_MOTOR_WORDS = ("torque", "force", "power")
 _BODY_WORDS = {"deflection": "m", "stress": "Pa"}
 # Name of the distance of the end-effector from its desired place.
 _ERROR = "error"
@@ -57,11 +58,12 @@ def quantity_named(name: str, mechanism: Mechanism) -> Quantity:
         The mechanism has no such quantity.
     """
     owner, _, word = name.rpartition(".")
-    if name == _ERROR:
+    if name == _ERROR and mechanism.end_effector is not None:
         return Quantity("m", _error)
-    if word in _MOTOR_WORDS and (word != "force" or owner not in mechanism.joints_by_name or _drives(owner, mechanism)):
-        if (found := _effort(name, owner, word, mechanism)) is not None:
-            return found
+    # At a joint "force" is that of the joint, unless a motor has the same name.
+    drives = word != "force" or owner not in mechanism.joints_by_name or _drives(owner, mechanism)
+    if word in MOTOR_WORDS and drives and (found := _effort(name, owner, word, mechanism)) is not None:
+        return found
     if owner in mechanism.joints_by_name and word in _JOINT_WORDS:
         return _of_joint(name, owner, word, mechanism)
     if word in _BODY_WORDS and owner in [body.name for body in mechanism.bodies]:
@@ -81,20 +83,20 @@ def quantity_named(name: str, mechanism: Mechanism) -> Quantity:
 
 def is_load(name: str) -> bool:
     """Check whether a quantity is a load or deformation, which equilibria have as well."""
-    return name.rpartition(".")[2] in (*_JOINT_LOADS, *_BODY_WORDS)
+    return name.rpartition(".")[2] in (*JOINT_LOADS, *_BODY_WORDS)
 
 
 def _names(mechanism: Mechanism) -> Iterator[str]:
     """Yield the names of the quantities of a mechanism."""
     for joint in mechanism.joints:
         own = [word for word, units in _JOINT_WORDS.items() if units[joint.slides]]
-        yield from (f"{joint.name}.{word}" for word in (own if joint.moves else _JOINT_LOADS))
+        yield from (f"{joint.name}.{word}" for word in (own if joint.moves else JOINT_LOADS))
     for one in (*mechanism.motors, *mechanism.prescribed):
         yield from (f"{one.name}.{word}" for word in ("force" if mechanism.slides(one.joint) else "torque", "power"))
     yield from (f"{point}.{word}" for point in _points(mechanism) for word in _POINT_WORDS)
     yield from (f"{body.name}.{word}" for body in mechanism.bodies if _bends(body) for word in _BODY_WORDS)
     yield from (f"{_SENSOR}.{sensor.name}" for sensor in mechanism.sensors)
-    yield _ERROR
+    yield from [_ERROR] if mechanism.end_effector is not None else []
 
 
 def _points(mechanism: Mechanism) -> list[str]:
@@ -145,7 +147,7 @@ def _of_joint(name: str, owner: str, word: str, mechanism: Mechanism) -> Quantit
     """Return a coordinate, its derivatives or a load of a joint."""
     slides = mechanism.slides(owner)
     unit = _JOINT_WORDS[word][slides]
-    if word not in _JOINT_LOADS:
+    if word not in JOINT_LOADS:
         coordinate_named(mechanism, owner, "metrics")
     if not unit:
         problem, other = ("slides: it has no angle", "travel") if slides else ("turns: it has no travel", "angle")

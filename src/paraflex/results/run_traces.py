@@ -11,7 +11,14 @@ from paraflex.control.laws.joints import internal_torques
 from paraflex.control.loop.run_loop import ControllerRecord
 from paraflex.control.loop.runs import ControlledMotion, ControlledTracking
 from paraflex.dynamics import System, joint_coordinate
-from paraflex.dynamics.joint_loads import LoadComponents, Loads, drive_torques, joint_loads, load_errors, undetermined_loads
+from paraflex.dynamics.joint_loads import (
+    LoadComponents,
+    Loads,
+    drive_torques,
+    joint_loads,
+    load_errors,
+    undetermined_loads,
+)
 from paraflex.dynamics.points import PointMotion, point_motion
 from paraflex.dynamics.quasi_static import joint_accelerations
 from paraflex.equilibria.conditions import Conditions, Coordinate
@@ -92,13 +99,13 @@ class SolutionTraces(Generic[R]):
         multipliers = np.where(np.isnan(self.solution.multipliers), 0.0, self.solution.multipliers)
         loads = joint_loads(self.system, self._joints, self.solution.q, multipliers, self.torque)
         unknown = self._undetermined
-        force = np.where(unknown.force.any(axis=2)[..., None], np.nan, loads.force)
+        force = np.where(unknown.force.any(axis=2, keepdims=True), np.nan, loads.force)
         return Loads(force, np.where(unknown.moment, np.nan, loads.moment))
 
     def joint_quantity(self, name: str, word: str) -> Trace:
-        """Return the "angle" or "travel", "rate" or "acceleration" of a joint, or its load: "force", "fx", "fy", "moment".
+        """Return a quantity of a joint at all samples (k,) in SI units, by its word.
 
-        In SI units, at all samples (k,).
+        The words are "angle" or "travel", "rate", "acceleration", "force" (its magnitude), "fx", "fy" and "moment".
         """
         if word in ("force", "fx", "fy", "moment"):
             k, (force, moment) = self._joints.index(name), self.joint_loads

@@ -47,7 +47,7 @@ class Objective(Brief):
         return tuple(dict.fromkeys([*self.weights, *others]))
 
     def metrics(self, design: EvaluatedDesign) -> dict[str, float]:
-        """Compute the worst or mean value of every metric; the worst is the farthest from a target, else the largest."""
+        """Compute the worst or mean value of every metric; of one with a target, the worst is the farthest from it."""
         worst = dict.fromkeys(self.columns, 0.0) | {column: self._worst(design, column) for column in self.weights}
         worst |= {column: self._worst(design, column, target) for column, target, _ in self.targets}
         return worst | {column: self._worst(design, column) for column, _ in self.limits}
