@@ -74,7 +74,7 @@ class MetricMembers(dict[str, Sequence[str]]):
         )
 
     def quantity(self, name: str) -> Quantity:
-        """Return a quantity of the runs by its name; of equilibria the travel of a coordinate unless it says another.
+        """Return a quantity of the runs by its name; the name of a coordinate of equilibria stands for its travel.
 
         Raises
         ------

@@ -46,9 +46,10 @@ def summary(data: xr.Dataset, failed: dict[str, str] | None = None) -> dict[str,
         peak_torque and rms_torque per motor, end_effector_final, the solver's figures, validity (None for rigid bodies)
         and `loads` (see `load_figures`); also `metrics` that were asked for, with value and unit, `sensors` of
         mechanisms with sensors (`sensor_figures`), `reduction` of reduced bodies (`reduced_run_figures`), `controllers`
-        and internal_torque_max [N m] (`controller_figures`). `tolerance` [m] of the integration; `error`, the time span of the error that ranks the modes; `verdict`, with
-        level and all findings; `after`, the state of the motors after the path; `part`, the part of the path covered by
-        runs that ended before it, else None; `parameters`; `version`. Values that a run did not reach are None.
+        and internal_torque_max [N m] (`controller_figures`). `tolerance` [m] of the integration; `error`, the time span
+        of the error that ranks the modes; `verdict`, with level and all findings; `after`, the state of the motors
+        after the path; `part`, the part of the path covered by runs that ended before it, else None; `parameters`;
+        `version`. Values that a run did not reach are None.
 
     Raises
     ------
