@@ -130,6 +130,24 @@ def test_derivatives_are_those_of_whole_runs(tmp_path):
             assert exact == pytest.approx(expected, rel=1e-3, abs=1e-5 * abs(values[metric])), (name, metric)
 
 
+def test_identification_and_sensitivities_take_expressions(tmp_path):
+    """A thickness is found again from what a run with it gave, by exact derivatives; units are of the expressions."""
+    text = STUDY.partition("[vary")[0].replace("tolerance = 1e-7", "tolerance = 1e-9")
+    vary = '[vary.thickness]\nfields = ["section.bar.thickness"]\n'
+    names = ["rms(tau1.torque[0.02:0.05])", "max(abs(link1.deflection))"]
+    study = text.replace("samples = 13", f"samples = 13\nmetrics = {names}") + vary
+    found = pf.sensitivities(write_study(tmp_path, study))
+    assert found.units == ("N m", "m")
+    targets = "".join(
+        f"[[target]]\nmetric = '{name}'\nvalue = {value!r}\n"
+        for name, value in zip(names, found.values[0].tolist(), strict=True)
+    )
+    limits = 'low = "4 mm"\nhigh = "6 mm"\nstart = "4.9 mm"\n'
+    result = pf.identify(write_study(tmp_path, text + vary + limits + targets, "fit.toml"), tmp_path / "fit", workers=1)
+    assert result.derivatives == "exact"
+    assert result.values["thickness"] == pytest.approx(0.005, rel=1e-4)
+
+
 REFUSED = [
     ("max(foo.x)", "no such quantity (got 'foo.x'); choose from "),
     ("max(A1.angel)", "no such quantity (got 'A1.angel'); did you mean \"A1.angle\"?"),

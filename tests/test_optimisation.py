@@ -576,6 +576,14 @@ def test_a_target_is_met(tmp_path, method, over):
     assert result.to_dict()["goal"]["targets"] == (("total_mass", 2.0, 100.0),)
 
 
+def test_the_negative_of_a_metric_is_least_where_the_metric_is_largest(tmp_path):
+    """Besides, a metric in W has limits in W."""
+    limit = '[[objective.at_most]]\nmetric = "motor_power_max"\nvalue = "0.3 kW"'
+    study = study_of(tmp_path, '[objective]\nminimise = { "-max(tau1.torque)" = 1.0 }\nrelative = false', limit)
+    run = made_up(**{"-max(tau1.torque)": lambda mode, x, y: -y, "motor_power_max": lambda mode, x, y: 500.0 * y})
+    assert optimise(study, tmp_path / "out", run=run).values["y"] == pytest.approx(0.6, rel=1e-4)
+
+
 def test_of_several_runs_the_one_farthest_from_a_target_counts(tmp_path):
     target = '[[objective.targets]]\nmetric = "total_mass"\ntarget = 2.0'
     modes = STUDY.replace('modes = ["++++"]', 'modes = ["++++", "+++-"]')
