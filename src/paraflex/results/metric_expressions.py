@@ -17,6 +17,7 @@ from paraflex.errors import InputError, suggestion
 from paraflex.expressions.dimensions import dimension_in
 from paraflex.expressions.evaluate import CONSTANTS, NO_EXPRESSION, ExpressionError, arithmetic, names_within, tree_of
 from paraflex.expressions.jets import FUNCTIONS, Jet, sqrt
+from paraflex.limits import EXPRESSION_LETTERS
 from paraflex.units import ANGLE, PLAIN, Dimension, dimension_text, unit_named
 from .formulas import SAME_TIME
 
@@ -265,6 +266,8 @@ def parsed(text: str) -> MetricExpression:
     try:
         tree = parser.visit(tree_of(text))
     except ExpressionError as error:
+        if len(text) > EXPRESSION_LETTERS:
+            raise ExpressionError(error.problem, f"at most {EXPRESSION_LETTERS} letters") from None
         if error.problem != NO_EXPRESSION:
             raise
         remedy = "write it like max(abs(body.point.y)), with quotes about 'names-with.other.signs'"
