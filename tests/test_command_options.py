@@ -130,6 +130,7 @@ def test_every_option_of_a_run_is_in_the_command_that_repeats_it_or_shows_result
         "reduced": 4, "reference": "free", "curvature": "shared", "after": "hold", "assembly": "start", "max_steps": 7,
         "method_parameters": {"a": 1.0}, "rigid": True, "ked": True, "balanced": True, "stop_at": ["singular=0.1"],
         "controllers": ["joint"], "tolerance_per": "run", "control": "forces", "allow_outside": True,
+        "metrics": ["max(abs(A1.rate))"],
     }  # fmt: skip
     lines = " ".join(
         command_line(each)

@@ -558,3 +558,64 @@ def test_an_objective_that_is_not_kept_by_default_is_computed(tmp_path, metrics)
     row = pd.read_parquet(result.table).iloc[0]
     assert row["joint_force_max"] == pytest.approx(result.metrics["joint_force_max"])
     assert row["joint_force_max"] > 0.0
+
+
+@pytest.mark.parametrize("over", ["worst", "mean"])
+@pytest.mark.parametrize("method", METHODS)
+def test_a_target_is_met(tmp_path, method, over):
+    """The bowl draws the mass below its target: u = x / 0.006 makes (u - 2/3)^2 + 100 (u - 1)^2 least."""
+    target = '[[objective.targets]]\nmetric = "total_mass"\ntarget = "2000 g"\nweight = 100.0'
+    objective = OBJECTIVE + f'over = "{over}"\n'
+    study = study_of(tmp_path, objective, target, method=method, evaluations=400 if method != "optuna" else 150, seed=3)
+    run = made_up(tracking_rms=bowl, total_mass=lambda mode, x, y: x / 0.003)
+    result = optimise(study, tmp_path / "out", run=run)
+    u = (2.0 / 3.0 + 100.0) / 101.0
+    close = 2e-3 if method in ("optuna", "nelder-mead") else 1e-4
+    assert result.metrics["total_mass"] == pytest.approx(2.0 * u, rel=5.0 * close)
+    assert result.objective == pytest.approx(0.5 + (u - 2.0 / 3.0) ** 2 + 100.0 * (u - 1.0) ** 2, abs=close)
+    assert result.to_dict()["goal"]["targets"] == (("total_mass", 2.0, 100.0),)
+
+
+def test_the_negative_of_a_metric_is_least_where_the_metric_is_largest(tmp_path):
+    """Besides, a metric in W has limits in W."""
+    limit = '[[objective.at_most]]\nmetric = "motor_power_max"\nvalue = "0.3 kW"'
+    study = study_of(tmp_path, '[objective]\nminimise = { "-max(tau1.torque)" = 1.0 }\nrelative = false', limit)
+    run = made_up(**{"-max(tau1.torque)": lambda mode, x, y: -y, "motor_power_max": lambda mode, x, y: 500.0 * y})
+    assert optimise(study, tmp_path / "out", run=run).values["y"] == pytest.approx(0.6, rel=1e-4)
+
+
+def test_of_several_runs_the_one_farthest_from_a_target_counts(tmp_path):
+    target = '[[objective.targets]]\nmetric = "total_mass"\ntarget = 2.0'
+    modes = STUDY.replace('modes = ["++++"]', 'modes = ["++++", "+++-"]')
+    study = load_optimisation(write_study(tmp_path, "\n".join([modes, target])))
+    run = made_up(tracking_rms=bowl, total_mass=lambda mode, x, y: (x - (0.001 if mode == "+++-" else 0.0)) / 0.002)
+    result = optimise(study, tmp_path / "out", run=run)
+    # Halfway: 2 kg +- 0.25 kg.
+    assert result.values["x"] == pytest.approx(0.0045, rel=1e-3)
+    assert abs(result.metrics["total_mass"] - 2.0) == pytest.approx(0.25, rel=5e-3)
+    # It has a kink where the other mode becomes the worst, so that the search may end beside it, but not far.
+    assert result.objective == pytest.approx((0.25 / 2.0) ** 2, rel=0.01)
+
+
+@pytest.mark.parametrize(
+    ("target", "says"),
+    [
+        ('metric = "total_mass"\ntarget = "2 m"',
+         "objective.targets.0.target: a quantity in m where one in kg is asked for (got '2 m'); give total_mass in kg"),
+        ('metric = "total_mass"\ntarget = 0.0', "objective.targets.0.target: nothing is relative to zero (got 0.0)"),
+        ('metric = "total_mass"\ntarget = 2.0\nweight = 0.0', "objective.targets.0.weight: must be positive"),
+        ('metric = "tracking_rms"\ntarget = 2.0', "objective.targets.0.metric: the objective has this metric already"),
+        ('metric = "mass"\ntarget = 2.0', "objective.targets.0.metric: unknown metric (got 'mass')"),
+        ('metric = "max(tau1.torqe)"\ntarget = 2.0',
+         "objective.targets.0.metric: no such quantity (got 'tau1.torqe'); did you mean \"tau1.torque\"?"),
+        ('metric = "max(tau1.torque)"\ntarget = "2 N"',
+         "objective.targets.0.target: a quantity in N where one in N m is asked for (got '2 N'); give max("),
+        ('metric = "total_mass"\nvalue = 2.0', "objective.targets.0.target"),
+        ('metric = "total_mass"\ntarget = nan', "objective.targets.0.target"),
+    ],
+)  # fmt: skip
+def test_targets_that_make_no_sense_are_refused(tmp_path, target, says):
+    with pytest.raises(InputError) as error:
+        study_of(tmp_path, OBJECTIVE, f"[[objective.targets]]\n{target}")
+    assert says in str(error.value)
+    assert "\n" not in str(error.value)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from pathlib import Path
 
 import numpy as np
@@ -12,10 +13,10 @@ import pytest
 
 import paraflex as pf
 from flexures import LENGTH, WIDTH, E
-from paraflex.designs.measure import measure, members_of
+from paraflex.designs.measure import measure
 from paraflex.designs.sweep import load_sweep
 from paraflex.files import library_text
-from paraflex.results.metrics import METRICS, STATICS, metric_unit
+from paraflex.results.metrics import METRICS, STATICS, MetricMembers, metric_unit
 from shell import paraflex
 
 BASE = 'mechanism = "leaf_spring_guide"\n'
@@ -178,8 +179,39 @@ def test_expressions_take_coordinates_in_all_steps_and_have_their_units():
     }  # fmt: skip
     got = measure(found, list(wanted))
     assert got == pytest.approx(wanted, rel=1e-12)
-    members = members_of(found.system.described, found.equations.conditions)
+    members = MetricMembers(found.system.described, found.equations.conditions)
     assert [metric_unit(name, members) for name in list(wanted)[::3]] == ["m", "N"]
+
+
+def test_names_of_coordinates_need_no_quotes(tmp_path):
+    """A minus sign in the name of a coordinate is none between two."""
+    text = re.sub(r"\bstage\b", "my-stage", library_text("leaf_spring_guide"))
+    (tmp_path / "guide.toml").write_text(text, encoding="utf-8")
+    found = pf.statics(pf.load(tmp_path / "guide.toml"), moved={"my-stage.T.x": -0.01}, steps=2)
+    y, x = found.travel("my-stage.T.y"), found.travel("my-stage.T.x")
+    wanted = {
+        "max(abs(my-stage.T.y))": np.max(np.abs(y)), "max(abs('my-stage.T.y'))": np.max(np.abs(y)),
+        "mean(effort.my-stage.T.x)": np.mean(found.effort("my-stage.T.x")),
+        "max(my-stage.T.y - my-stage.T.x) - 1 mm": np.max(y - x) - 1e-3,
+    }  # fmt: skip
+    assert measure(found, list(wanted)) == pytest.approx(wanted, rel=1e-12)
+
+
+def test_equilibria_have_loads_of_joints_and_stresses_of_beams():
+    found = pf.statics(pf.load("leaf_spring_guide"), moved={"stage.T.x": 0.01}, steps=2)
+    got = measure(found, ["joint_force_max", "max(L.force)", "stress_max", "max(left.stress)", "max(right.stress)"])
+    forces = [measure(found, [f"max({joint.name}.force)"]) for joint in found.system.described.joints]
+    assert got["joint_force_max"] == pytest.approx(max(max(one.values()) for one in forces), rel=1e-12)
+    assert got["stress_max"] == pytest.approx(max(got["max(left.stress)"], got["max(right.stress)"]), rel=1e-12)
+
+
+def test_a_stiffness_is_sought_in_n_per_mm(tmp_path):
+    """Of two leaves, 2 E b (t / L)^3."""
+    target = '[[objective.targets]]\nmetric = "last(stiffness.stage.T.x)"\ntarget = "1 N/mm"\n'
+    ranges, search = RANGES.partition("[vary.length]")[0], "[search]\ntolerance = 1e-8\n"
+    found = pf.optimise(written(tmp_path, BASE, STRAIGHT, ranges, target, search), tmp_path / "out")
+    assert found.values["thickness"] == pytest.approx(LENGTH * np.cbrt(1e3 / (2.0 * E * WIDTH)), rel=1e-3)
+    assert found.units["last(stiffness.stage.T.x)"] == "N/m"
 
 
 @pytest.mark.parametrize(
@@ -187,9 +219,11 @@ def test_expressions_take_coordinates_in_all_steps_and_have_their_units():
     [
         ("max(abs(stage.T.q))", "unknown coordinate (got 'stage.T.q')"),
         ("max(stiffness.stage.T.angle)", "unknown direction (got 'stage.T.angle')"),
-        ("largest(stage.T.y)", "no such expression of a metric (got 'largest(stage.T.y)')"),
-        ("max(abs(stage.T.y)", "no such expression"),
-        ("max(stage.T.y) + 1", "no such expression"),
+        ("largest(stage.T.y)", "unknown function \"largest\" (got 'largest(stage.T.y)')"),
+        ("max(abs(stage.T.y)", "no such expression of a metric (got 'max(abs(stage.T.y)')"),
+        ("max(stage.T.y) + 1", "a sum of a quantity in m and a number without a unit (got 'max(stage.T.y) + 1')"),
+        ("max(stage.T.y) + max(effort.stage.T.x)", "a sum of quantities in m and in N"),
+        ("max(stage.T.y[0:1])", "equilibria have no time"),
     ],
 )
 def test_expressions_that_make_no_sense_are_refused(tmp_path, metric, message):

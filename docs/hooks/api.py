@@ -66,6 +66,7 @@ PACKAGES = (
     "plots.compare",
     "reports",
     "results.metrics",
+    "designs.measure",
     "designs.setting",
     "designs.samples",
     "designs.run",

@@ -182,6 +182,7 @@ from .results import (
     open_results as open_results,
     compare as compare,
 )
+from .designs.measure import metrics as metrics
 from .results.export import export as export
 from .plots.film import FilmOptions as FilmOptions, animate as animate
 from .studies.report import report as report

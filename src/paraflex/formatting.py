@@ -212,9 +212,9 @@ def output_unit(unit: str) -> DisplayUnit:
 def _quantity_in(unit: str) -> str:
     """Return the one of `QUANTITIES` that has a unit; empty if there is none."""
     found = unit_of(unit.translate(_UNRAISED))
-    # Frequencies have the dimension of rates of decay.
+    # Frequencies have the dimension of rates of decay, and torques that of energies.
     known = (name for name, si in QUANTITIES.items() if found and unit_named(si).dimension == found.dimension)
-    return next((name for name in known if name != "frequency" or "Hz" in unit), "")
+    return next((name for name in known if ("Hz" in unit if name == "frequency" else "J" not in unit)), "")
 
 
 @contextmanager

@@ -70,6 +70,8 @@ _PREFIXED = {
     "N": _unit(1, m=1, kg=1, s=-2),
     "Nm": _unit(1, m=2, kg=1, s=-2),
     "Pa": _unit(1, m=-1, kg=1, s=-2),
+    "J": _unit(1, m=2, kg=1, s=-2),
+    "W": _unit(1, m=2, kg=1, s=-3),
     "Hz": _unit(1, s=-1),
     "A": _unit(1, A=1),
     "V": _unit(1, m=2, kg=1, s=-3, A=-1),
@@ -197,7 +199,7 @@ WHERE_IT_SLIDES = {
 
 def dimension_text(dimension: Dimension) -> str:
     """Return the SI unit of a dimension, as the fields of files spell it where they have it."""
-    for unit in FIELD_UNITS:
+    for unit in (*FIELD_UNITS, "rad/s^2", "W"):
         if unit_named(unit).dimension == dimension:
             return unit
     powers = zip(("kg", "m", "s", "rad", "A"), (dimension[k] for k in (1, 0, 2, 3, 4)), strict=True)

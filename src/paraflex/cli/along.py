@@ -13,6 +13,7 @@ from paraflex.campaign import OnProgress, Progress
 from paraflex.checks import check_planned
 from paraflex.compilation import compile_all_kernels, compile_kernels
 from paraflex.control import ControllerDescription, simulate_controlled
+from paraflex.designs.measure import metrics_of
 from paraflex.elastodynamics import simulate_ked
 from paraflex.errors import InputError
 from paraflex.fem import ReferenceCondition
@@ -24,10 +25,12 @@ from paraflex.mechanism import ActuationMode, Curvature, Geometry, Mechanism, pr
 from paraflex.paths import Path
 from paraflex.reduced_bodies import AUTO, Reduction, reduced_task
 from paraflex.results.findings import keep_findings, verdict_of
+from paraflex.results.metrics import PATH
 from paraflex.studies.tracking import Simulator, StudyResult, TrackingStudy
 from paraflex.tracking import TrackingRun, TrackingTask, simulate
 from .bars import bars
 from .collected import apart, collected
+from .commands.requests import flagged
 from .commands.runs import RunRequest
 from .ending import drawing, exit_code, print_results, where, write_numbers
 from .integration import kept_coordinates, locating_reduction, run_parameters
@@ -77,6 +80,8 @@ def run_along(
         task, full, reduction = requested_tasks(request, model, mechanism, (path, name), modes, options)
         if request.segments is not None:
             check_stops(task.mechanism, options, request.stop_at)
+        with flagged(request, first=True):
+            metrics_of(request.metrics, model.study.error, task.mechanism, PATH, float(task.motion.t[-1]))
         run = {
             "path": name,
             "modes": [mode.name for mode in modes],
@@ -92,7 +97,8 @@ def run_along(
         method, error = own_method(request, options, controllers), model.study.error
         study = TrackingStudy(
             task, modes, options, parameters, method, error, warning=False, findings=findings, full=full,
-            reduction=reduction, beside=None if other is None else task.remodelled(other), elsewhere=elsewhere,
+            reduction=reduction, metrics=request.metrics,
+            beside=None if other is None else task.remodelled(other), elsewhere=elsewhere,
         )  # fmt: skip
         planned.append(_Along(name, study, folder, f'path "{name}": ' if len(paths) > 1 else ""))
     return _run(request, model, planned, _model_name(request, mechanism), began)

@@ -94,6 +94,8 @@ def run_parameters(
         "max_steps": request.max_steps,
         "geometry": mechanism.geometry.value,
     } | asdict(request.frames)
+    if request.metrics:
+        found["metrics"] = list(request.metrics)
     if request.ked:  # its steps are fixed
         return found
     return found | {

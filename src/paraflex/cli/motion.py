@@ -10,6 +10,7 @@ from rich.progress import TimeElapsedColumn
 from paraflex.checks import check
 from paraflex.compilation import compile_kernels_for
 from paraflex.control import ControllerDescription
+from paraflex.designs.measure import metric_figures, metrics_of
 from paraflex.designs.own_motion import own_run
 from paraflex.dynamics import State, build_system, standing_system
 from paraflex.dynamics.state import nearest_state
@@ -26,16 +27,18 @@ from paraflex.motion import MotionRun, state_at
 from paraflex.reduced_bodies import AUTO, reduced_mechanism, size_of
 from paraflex.results import motion_dataset, motion_summary
 from paraflex.results.findings import validity_line
+from paraflex.results.metrics import MOTION, keep_metrics
 from paraflex.results.reduced_runs import compared_with_full
 from .bars import late_bar
 from .collected import collected
 from .commands.options import PlanChoice
+from .commands.requests import flagged
 from .commands.runs import RunRequest
 from .ending import drawing, exit_code, print_location, print_results, write_numbers
 from .integration import kept_coordinates, locating_reduction, run_parameters
 from .replacing import hold_results
 from .request import acting_controllers, command_provenance, controller_arguments, locating_errors
-from .run_lines import load_lines
+from .run_lines import load_lines, metric_lines
 from .tables import PlainConsole, print_table
 
 # Largest number of singular positions listed.
@@ -69,6 +72,8 @@ def run_motion(request: RunRequest, model: Model, mechanism: Mechanism, options:
             field="study.reduced" if request.reduced is None else "--reduced", value=AUTO,
             remedy="leave it out, or give a number where beams are flexible",
         )  # fmt: skip
+    with flagged(request, first=True):
+        metrics_of(request.metrics, study.error, mechanism, MOTION, study.duration)
     with hold_results(request.out, RUN, force=request.force) as folder:
         console, model = PlainConsole(stderr=True), replace(model, study=study)
         compile_kernels_for(mechanism, console.print)
@@ -95,6 +100,8 @@ def run_motion(request: RunRequest, model: Model, mechanism: Mechanism, options:
         if run is not full:
             sizes = [size_of(one.system, _first(one)) for one in (run, full)]
             data = compared_with_full(data, motion_dataset(full, options=options), *sizes)
+        if request.metrics:
+            keep_metrics(data, {"": metric_figures(run, request.metrics)})
         summary = motion_summary(data)
         finished, interrupted = run.solution.status in DONE_STATUSES, run.solution.status == "interrupted"
         try:
@@ -185,7 +192,7 @@ def _report(out: PlainConsole, summary: dict) -> None:
             f"{reduced_words(reduced)}: points are up to {quantity(reduced['distance'], 'm', digits=2)} from their "
             f"positions in the full run, in {number(summary['wall_time'] / reduced['full_wall_time'], 2)} of its time"
         )
-    out.print_lines(*load_lines({"": summary["loads"]}))
+    out.print_lines(*load_lines({"": summary["loads"]}), *metric_lines({"": summary}))
     print_table(out, controller_table({(): summary}))
     out.print("at the end:")
     # Points at which finite segments are connected by the program are left out.

@@ -10,10 +10,12 @@ from paraflex.figures.loads import stress_table
 from paraflex.figures.reduction import reduced_runs_table, reduced_words
 from paraflex.figures.tracking import Runs, after_table, beside_table, beside_words, result_table
 from paraflex.findings import DONE_STATUSES
+from paraflex.formatting import quantity
 from paraflex.mechanism.actuation_modes import SERVO
 from paraflex.results.findings import validity_line
 from paraflex.results.following import HEADLINE, ErrorSpan, below_tolerance_line, headline
 from paraflex.results.loads import effort_lines, joint_line, stress_line
+from paraflex.results.metrics import metric_label
 from paraflex.studies.tracking import StudyResult
 from paraflex.tracking import TrackingTask
 from .tables import PlainConsole, print_table
@@ -74,7 +76,7 @@ def print_runs(
     if len(results) > 1:
         stresses = stress_table({names: one.get("loads", {}) for names, one in runs.items()}, heads, largest=True)
         print_table(out, stresses, "Largest stress of every run")
-    out.print_lines(*load_lines({name: mode.get("loads", {}) for name, mode in modes.items()}))
+    out.print_lines(*load_lines({name: mode.get("loads", {}) for name, mode in modes.items()}), *metric_lines(modes))
 
 
 def print_beside(out: PlainConsole, data: xr.Dataset) -> None:
@@ -102,6 +104,16 @@ def load_lines(loads: Mapping[str, Mapping[str, Any]]) -> list[str]:
     """
     efforts = [line for name, one in loads.items() for line in effort_lines(one, name)]
     return [stress_line(loads), *efforts, joint_line(loads)]
+
+
+def metric_lines(runs: Mapping[str, Mapping[str, Any]]) -> list[str]:
+    """Return a line for each metric that was asked for, of each run by its name, which may be empty."""
+    return [
+        f"{f'mode {name}, ' if name else ''}{metric_label(column)}: "
+        + ("-" if one["value"] is None else quantity(one["value"], one["unit"], digits=4, padded=False))
+        for name, run in runs.items()
+        for column, one in run.get("metrics", {}).items()
+    ]
 
 
 def failures(out: PlainConsole, result: StudyResult, whose: str = "") -> None:

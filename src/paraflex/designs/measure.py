@@ -5,32 +5,30 @@ from typing import Any
 
 import numpy as np
 
+from paraflex.arguments import checked_arguments
 from paraflex.arrays import NDArray
-from paraflex.equilibria.conditions import Conditions
 from paraflex.equilibria.result import Statics
-from paraflex.errors import InputError, IntegrationError, Moment, as_enum, suggestion
+from paraflex.errors import InputError, IntegrationError, Moment, as_enum, renamed, suggestion
 from paraflex.integrators.between import COARSE
 from paraflex.mechanism import Mechanism
 from paraflex.mechanism.quantities import all_listed
 from paraflex.motion import MotionRun
 from paraflex.results.following import HEADLINE, ErrorSpan
+from paraflex.results.formulas import SAME_TIME
 from paraflex.results.metrics import (
     ALWAYS,
-    COORDINATE,
-    DIRECTION,
-    DRIVE,
-    JOINT,
     METRICS,
     MOTION,
-    MOTOR,
     PATH,
     STATICS,
     VALIDITY,
-    Members,
     Metric,
+    MetricMembers,
+    has_loads,
     metric_name,
-    sliding,
+    metric_until,
 )
+from paraflex.results.numbers import finite_or_none
 from paraflex.results.run_traces import MotionTraces, RunTraces, StaticsTraces, run_traces
 from paraflex.tracking import TrackingRun
 from paraflex.validity import shared_loads, unresolved_loads
@@ -70,30 +68,20 @@ def check_metric(column: str, field: str = "metrics", known: Sequence[str] = tup
     """
     name = metric_name(column)
     if name not in METRICS:
-        raise InputError("unknown metric", field=field, value=column, remedy=suggestion(name, list(known)))
-
-
-def members_of(mechanism: Mechanism, given: Conditions | None = None) -> Members:
-    """Return the names of the members with one column of a metric each, by kind, and of those that slide.
-
-    The members are motors, drives (prescribed motions) and joints. If `given` holds the conditions of equilibria, they
-    are the named coordinates, and those with a stiffness.
-    """
-    if given is not None:
-        straight = tuple(one.name for one in given.coordinates if one.unit == "m")
-        found = {COORDINATE: given.coordinates, DIRECTION: given.measured}
-        names = {kind: tuple(one.name for one in each) for kind, each in found.items()}
-        return names | {sliding(kind): straight for kind in names}
-    found = {MOTOR: mechanism.motors, DRIVE: mechanism.prescribed, JOINT: mechanism.joints}
-    slides = {joint.name for joint in mechanism.joints if joint.slides}
-    return {kind: tuple(one.name for one in each) for kind, each in found.items()} | {
-        sliding(kind): tuple(one.name for one in each if getattr(one, "joint", one.name) in slides)
-        for kind, each in found.items()
-    }
+        remedy = suggestion(name, list(known))
+        if name != column:
+            remedy = f"a quantity of a run needs a function of its samples, as max(abs({column})); else {remedy}"
+        raise InputError("unknown metric", field=field, value=column, remedy=remedy)
+    with renamed(field, only="metrics"):
+        _ = METRICS[name]
 
 
 def metrics_of(
-    names: Sequence[str], error: ErrorSpan | str, mechanism: Mechanism | None = None, runs: str = PATH
+    names: Sequence[str],
+    error: ErrorSpan | str,
+    mechanism: Mechanism | None = None,
+    runs: str = PATH,
+    duration: float | None = None,
 ) -> tuple[str, ...]:
     """Return the metrics of a study in the given order, followed by those that are always kept.
 
@@ -107,11 +95,13 @@ def metrics_of(
         Mechanism of the runs; without motors, metrics of motors are not kept by default.
     runs : str
         Kind of runs: "path", "motion" or "statics".
+    duration : float, optional
+        Duration of the runs [s], within which windows of expressions must lie.
 
     Raises
     ------
     InputError
-        A name is unknown, or such runs do not have the metric.
+        A name is unknown, such runs do not have the metric, or an expression does not fit the mechanism.
     """
     for name in names:
         check_metric(name)
@@ -120,6 +110,9 @@ def metrics_of(
                 f"a metric of each {metric_of(name).each or 'run'} is kept of all", field="metrics", value=name,
                 remedy=f'write "{metric_of(name).name}"',
             )  # fmt: skip
+        if mechanism is not None and runs != STATICS:
+            METRICS[name].columns(MetricMembers(mechanism))
+            check_window(name, duration)
         if runs not in METRICS[name].runs:
             raise InputError(
                 f"a metric of {' or '.join(_OF_RUNS[each] for each in METRICS[name].runs)}, not of "
@@ -136,13 +129,26 @@ def metrics_of(
     return tuple(dict.fromkeys([*first, *kept, *ALWAYS[runs]]))
 
 
+def check_window(name: str, duration: float | None) -> None:
+    """Check that the windows of a metric by expression lie within runs of a duration [s], if it is known."""
+    until = metric_until(name)
+    if duration is not None and until > duration * (1.0 + SAME_TIME):
+        raise InputError(
+            f"a window until {until:g} s, and runs end at {duration:g} s", field="metrics", value=name,
+            remedy="choose an earlier one, or leave out its end",
+        )  # fmt: skip
+
+
 def metric_columns(run: Runs, names: Sequence[str]) -> tuple[str, ...]:
     """Return the columns of metrics: NAME, or NAME.MEMBER for those of each motor, joint or other member."""
-    if isinstance(run, Statics):
-        members = members_of(run.system.described, run.equations.conditions)
-    else:
-        members = members_of(run.system.described if isinstance(run, MotionRun) else run.task.mechanism)
+    members = _members(run)
     return tuple(column for name in names for column in METRICS[name].columns(members))
+
+
+def _members(run: Runs) -> MetricMembers:
+    if isinstance(run, Statics):
+        return MetricMembers(run.system.described, run.equations.conditions)
+    return MetricMembers(run.system.described if isinstance(run, MotionRun) else run.task.mechanism)
 
 
 def metric_values(traces: RunsTraces, nominal: RunsTraces, names: Sequence[str]) -> NDArray[Any]:
@@ -168,13 +174,56 @@ def measure(run: Runs, names: Sequence[str]) -> dict[str, float | int]:
     return {column: int(value) if metric_of(column).whole else float(value) for column, value in values}
 
 
+@checked_arguments()
+def metrics(run: Runs, names: Sequence[str]) -> dict[str, float | int]:
+    """Return metrics of a complete run in SI units, by name or expression, such as "max(abs(stage.T.y))".
+
+    Parameters
+    ----------
+    run : TrackingRun, MotionRun or Statics
+        Run, or equilibria.
+    names : sequence of str
+        Names of metrics and expressions; see docs/sweeps.md. A metric of each motor, joint or other member has a
+        number NAME.MEMBER for each.
+
+    Raises
+    ------
+    InputError
+        Unknown metric, one that such runs do not have, or expression that does not fit the run.
+    IntegrationError
+        The run was stopped by an event.
+    """
+    kind = STATICS if isinstance(run, Statics) else MOTION if isinstance(run, MotionRun) else PATH
+    metrics_of(names, ErrorSpan.MOTION, _members(run).mechanism, kind)
+    return measure(run, names)
+
+
+def metric_figures(run: Runs, names: Sequence[str]) -> dict[str, dict[str, Any]]:
+    """Return metrics of a run as plain values: `value` and `unit` by column; `value` is None if there is none."""
+    members, out = _members(run), {}
+    complete = run.solution.status == "complete"
+    for name in names:
+        columns = METRICS[name].columns(members)
+        try:
+            found = measure(run, [name]) if complete else {}
+        # A window may have no sample; the results of the run are kept all the same.
+        except InputError:
+            found = {}
+        for column in columns:
+            value = finite_or_none(found.get(column, float("nan")))
+            out[column] = {"value": value, "unit": METRICS[name].unit_of(column, members)}
+    return out
+
+
 def coarseness(run: Runs, names: Sequence[str]) -> str:
     """Return the reasons why load metrics are doubtful: peaks between samples, integration errors, shared loads.
 
     The text is empty if there is no reason.
     """
-    found = [one for one in run.solution.findings if one.code == COARSE] if set(names) & set(_LARGEST_LOADS) else []
-    if set(names) & set(_SHARED_LOADS):
+    expressed = {name for name in names if has_loads(name, _members(run).mechanism)}
+    largest = expressed | (set(names) & set(_LARGEST_LOADS))
+    found = [one for one in run.solution.findings if one.code == COARSE] if largest else []
+    if expressed | (set(names) & set(_SHARED_LOADS)):
         system = run_traces(run).system
         found += [*shared_loads(system, run.solution), *unresolved_loads(system, run.solution)]
     return "; ".join(f"{one.text}; {one.remedy}" for one in found)
@@ -200,7 +249,7 @@ def check_smooth(names: Sequence[str]) -> None:
     InputError
         A metric is not differentiable, such as one that describes the integration.
     """
-    all_listed(names, SMOOTH, "metrics", "has no derivative")
+    all_listed([name for name in names if not METRICS[name].smooth], SMOOTH, "metrics", "has no derivative")
 
 
 def beyond_limits(runs: int) -> str:

@@ -22,7 +22,7 @@ from paraflex.mechanism import Geometry, Mechanism
 from paraflex.motion import MotionRun, state_at
 from paraflex.reduced_bodies import reduced_task
 from paraflex.results import motion_dataset, statics_dataset, tracking_dataset
-from paraflex.results.metrics import METRICS, Members
+from paraflex.results.metrics import METRICS, MetricMembers
 from paraflex.tracking import TrackingTask, simulate
 from .measure import Runs, coarseness, measure
 from .own_motion import own_run
@@ -180,7 +180,7 @@ def _planned(setting: Setting, model: Model, task: Task, options: IntegrationOpt
     return planned
 
 
-def table_schema(setting: Setting, members: Members) -> pa.Schema:
+def table_schema(setting: Setting, members: MetricMembers) -> pa.Schema:
     """Return the schema of the table of rows: run, parameters, status, metrics, with units in the fields' metadata."""
     import pyarrow as pa
 

@@ -25,7 +25,7 @@ from paraflex.limits import WHOLE, at_most, of_size
 from paraflex.mechanism.quantities import known
 from paraflex.results.dataset import part_of
 from paraflex.results.following import PathPart
-from paraflex.results.metrics import METRICS, MOTION, PATH, STATICS, Members, metric_unit
+from paraflex.results.metrics import METRICS, MOTION, PATH, STATICS, MetricMembers, metric_unit
 from paraflex.validity import implausible_numbers
 from .measure import metrics_of
 from .own_motion import own_duration
@@ -123,7 +123,7 @@ class Setting(Brief):
                  for name, places in zip(self.names, self.places, strict=True)}  # fmt: skip
         return {name: one.pop() if len(one) == 1 else "" for name, one in units.items()}
 
-    def units(self, members: Members) -> dict[str, str]:
+    def units(self, members: MetricMembers) -> dict[str, str]:
         """Return the SI units of the parameters and of the columns of all metrics."""
         columns = (column for name in self.metrics for column in METRICS[name].columns(members))
         return self.parameter_units | {column: metric_unit(column, members) for column in columns}
@@ -213,7 +213,7 @@ def make_setting(table: SweepTable, folder: FilePath) -> tuple[Setting, tuple[Sw
         samples=table.samples,
         assembly=table.assembly,
         integration=_integration(table),
-        metrics=metrics_of(table.metrics, model.study.error, model.mechanism, runs),
+        metrics=metrics_of(table.metrics, model.study.error, model.mechanism, runs, table.duration),
         trajectories=table.trajectories,
         versions=versions(),
         text=model.text,

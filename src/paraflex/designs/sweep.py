@@ -36,11 +36,10 @@ from paraflex.equilibria.conditions import conditions
 from paraflex.errors import InputError
 from paraflex.files import Model, model_from
 from paraflex.folders import check_inside
-from paraflex.results.metrics import VALIDITY, Members
+from paraflex.results.metrics import METRICS, VALIDITY, MetricMembers
 from paraflex.results.storage import write_results
 from paraflex.results.tables import read_parquet
 from paraflex.writing import GO_ON, write_json
-from .measure import members_of
 from .reopen import study_account
 from .run import STATUS_COMPLETE, Outcome, RunTask, Task, is_row_of, lost, run_id, run_task, table_schema
 from .samples import SweptParameter, check_varied, designs
@@ -150,7 +149,7 @@ class SweepStudy(Study["SweepResult"]):
     parameters: tuple[SweptParameter, ...]
     kind: str
     designs: Array
-    members: Members
+    members: MetricMembers
 
     @property
     def runs(self) -> int:
@@ -260,13 +259,16 @@ def make_study(table: SweepTable, folder: Path) -> SweepStudy:
     for parameter in parameters:
         check_varied(parameter, table.sampling.kind)
     sampling = table.sampling
+    members = MetricMembers(model.mechanism, conditions(model.mechanism, model.statics) if setting.statics else None)
+    for name in setting.metrics:
+        METRICS[name].columns(members)
     return SweepStudy(
         name=table.name,
         setting=setting,
         parameters=parameters,
         kind=sampling.kind,
         designs=designs(parameters, sampling.kind, sampling.number, sampling.seed),
-        members=members_of(model.mechanism, conditions(model.mechanism, model.statics) if setting.statics else None),
+        members=members,
     )
 
 

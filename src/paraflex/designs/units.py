@@ -7,7 +7,7 @@ from pydantic import BaseModel
 
 from paraflex.files.fields import Place, check_unit, field_at, leaves, units_at
 from paraflex.files.schema import ModelTable, NumberOfText
-from paraflex.results.metrics import Members, metric_unit
+from paraflex.results.metrics import MetricMembers, metric_unit
 from .schema import SweepTable
 
 
@@ -33,7 +33,7 @@ def check_unit_of(data: Mapping[str, Any], place: Place, text: str, field: str) 
     check_unit(text, {}, units_at(schema, data, place), field, field_at(schema, data, place).description)
 
 
-def check_unit_of_metric(value: float, column: str, members: Members, field: str) -> None:
+def check_unit_of_metric(value: float, column: str, members: MetricMembers, field: str) -> None:
     """Check the unit of an expression that a study gives for the target or limit of a metric.
 
     Raises

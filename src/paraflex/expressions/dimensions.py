@@ -1,6 +1,7 @@
 """Dimensional analysis of expressions, as far as their units determine dimensions."""
 
 import ast
+import math
 from collections.abc import Callable, Mapping
 from functools import reduce
 from typing import Any
@@ -8,6 +9,8 @@ from typing import Any
 from paraflex.units import ANGLE, PLAIN, Dimension, dimension_text, quantities_in, unit_named
 from .evaluate import CONSTANTS, ExpressionError, expressed_in, names_in, quantity_in, tree_of
 
+# Work and power, as products of torques.
+_OF_TORQUES = {(*unit_named(unit).dimension[:3], 1, 0): unit_named(unit).dimension for unit in ("J", "W")}
 # Function from a name to its dimension; None where it is unknown, as for the time or a parameter without a unit.
 _Of = Callable[[str], Dimension | None]
 
@@ -34,7 +37,12 @@ def dimension_of(text: str, parameters: Mapping[str, Dimension | None]) -> Dimen
     names = names_in(text)
     if any("." in name for name in names) and not quantities_in(text) and not any(map(parameters.get, names)):
         return None  # all its numbers are in SI units
-    return _dimension(tree_of(text), lambda name: PLAIN if name in CONSTANTS else _named(name, parameters))
+    return dimension_in(tree_of(text), lambda name: _named(name, parameters))
+
+
+def dimension_in(tree: ast.AST, of: _Of) -> Dimension | None:
+    """Return the dimension of a syntax tree from those of its names, as `dimension_of` does."""
+    return _dimension(tree, lambda name: PLAIN if name in CONSTANTS else of(name))
 
 
 def _named(name: str, parameters: Mapping[str, Dimension | None]) -> Dimension | None:
@@ -108,15 +116,19 @@ def _of_sum(one: Dimension | None, other: Dimension | None) -> Dimension | None:
 def _product(one: Dimension | None, other: Dimension | None, sign: int) -> Dimension | None:
     if one is None or other is None:
         return None
-    return tuple(a + sign * b for a, b in zip(one, other, strict=True))  # type: ignore[return-value]
+    found = tuple(a + sign * b for a, b in zip(one, other, strict=True))
+    # The product of a torque and an angle is a work, and that of a torque and a rate is a power.
+    return _OF_TORQUES.get(found, found) if sign > 0 else found  # type: ignore[return-value]
 
 
 def _power(base: Dimension | None, exponent: ast.AST) -> Dimension | None:
     if base is None or base == PLAIN:
         return base
     match exponent:
-        case ast.Constant(value=int() as power):
-            return tuple(power * each for each in base)  # type: ignore[return-value]
+        case ast.Constant(value=int() | float() as power) if all(math.fmod(power * each, 1.0) == 0.0 for each in base):
+            return tuple(int(power * each) for each in base)  # type: ignore[return-value]
+        case ast.UnaryOp(op=ast.USub(), operand=positive):
+            return _product(PLAIN, _power(base, positive), -1)
     return None
 
 

@@ -19,6 +19,8 @@ from paraflex.units import UNITS, divisors_in, quantities_in, unknown_unit
 from .jets import FUNCTIONS, Jet
 
 CONSTANTS = {"pi": math.pi}
+# Problem of a text with a syntax error.
+NO_EXPRESSION = "neither a number nor an expression"
 # Name of the time in expressions.
 TIME_NAME = "t"
 _BINARY: dict[type, Callable[[Any, Any], Any]] = {
@@ -120,10 +122,11 @@ def is_constant(text: str) -> bool:
 
 def names_in(text: str) -> set[str]:
     """Return the names in an expression: parameters, functions, time, and quantities of a motion."""
-    return set(_names(tree_of(text)))
+    return set(names_within(tree_of(text)))
 
 
-def _names(node: ast.AST) -> Iterator[str]:
+def names_within(node: ast.AST) -> Iterator[str]:
+    """Yield the names in a syntax tree; see `names_in`."""
     name = quantity_in(node)
     if name is not None:
         yield name
@@ -131,7 +134,7 @@ def _names(node: ast.AST) -> Iterator[str]:
     if isinstance(node, ast.Name):
         yield node.id
     for child in ast.iter_child_nodes(node) if not isinstance(getattr(node, "op", None), ast.MatMult) else ():
-        yield from _names(child)
+        yield from names_within(child)
 
 
 def quantity_in(node: ast.AST) -> str | None:
@@ -241,7 +244,7 @@ def tree_of(text: str) -> ast.AST:
         if unknown is not None:
             raise ExpressionError(f'unknown unit "{unknown[0]}"', unknown[1]) from None
         remedy = 'write it like "l1 - 0.5 * la", or "80 mm" with the unit behind a number'
-        raise ExpressionError("neither a number nor an expression", remedy) from None
+        raise ExpressionError(NO_EXPRESSION, remedy) from None
     except OverflowError:
         raise ExpressionError("too large a number", "check its digits") from None
 
@@ -271,7 +274,17 @@ def refuse_ambiguous(text: str, parameters: Mapping[str, Any]) -> None:
 
 
 def _arithmetic(text: str, value_of: Callable[[str], Any]) -> Any:
-    tree = tree_of(text)
+    return arithmetic(tree_of(text), value_of)
+
+
+def arithmetic(tree: ast.AST, value_of: Callable[[str], Any]) -> Any:
+    """Evaluate a syntax tree; `value_of` gives the number, or the jet, of a parameter, a quantity or the time.
+
+    Raises
+    ------
+    ExpressionError
+        Element that is not allowed, or number that does not exist.
+    """
     try:
         return _value(tree, value_of)
     except ZeroDivisionError:

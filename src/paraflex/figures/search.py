@@ -176,7 +176,9 @@ def metric_table(found: Mapping[str, Any], units: Mapping[str, str]) -> Table:
     """Return the table of objective and metrics of the best design of an optimisation and of the start."""
     now, before = ({"objective": found.get(f"{kind}objective")} | (found.get(f"{kind}metrics") or {})
                    for kind in ("", "start_"))  # fmt: skip
+    targets = {name: target for name, target, _ in (found.get("goal") or {}).get("targets", ())}
     columns = in_row_units([
+        *([Column("target", [targets.get(name) for name in now], digits=5)] if targets else []),
         Column("found", list(now.values()), digits=5),
         Column("start", [before.get(name) for name in now], digits=5),
     ], [units.get(name, "") for name in now])  # fmt: skip

@@ -25,7 +25,7 @@ _COMMANDS: Mapping[str, Sequence[str]] = {
     "run": (
         "model", "path", "modes", "controllers", *_PLAN, "tolerance", "tolerance_per", "control", "method", "step",
         "constraints", "segments", "reduced", *_FRAMES, "after", "max_steps", "method_parameters", "alpha", "beta",
-        "automatic_gains", "rigid", "ked", "balanced", "geometry", "stop_at",
+        "automatic_gains", "rigid", "ked", "balanced", "geometry", "stop_at", "metrics",
     ),
     "verify": ("model", "path", "modes", "fidelities", "engines", *_PLAN, "tolerance", "method", "segments", *_FRAMES),
     "statics": ("model", "loads", "torques", "moved", "held", "stiffness", "steps", "buckling", "assembly"),
@@ -39,6 +39,7 @@ _FLAGS = {
     "tolerance": "--tol", "modes": "--mode", "controllers": "--controller", "method_parameters": "--method-parameter",
     "fidelities": "--model", "engines": "--engine", "loads": "--load", "torques": "--torque", "moved": "--move",
     "held": "--hold", "forces": "--force-at", "set": "--set", "methods": "--method", "start": "--from", "end": "--to",
+    "metrics": "--metric",
 }  # fmt: skip
 
 

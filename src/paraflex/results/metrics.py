@@ -7,18 +7,26 @@ a magnitude has, so that the formula consists of sums, products and roots only.
 
 from __future__ import annotations
 
+import json
 import re
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+import xarray as xr
 
-from paraflex.errors import InputError
-from paraflex.mechanism import rotor_mass
+from paraflex.equilibria.conditions import Conditions
+from paraflex.expressions.evaluate import ExpressionError, expressed_in
+from paraflex.expressions.jets import Jet
+from paraflex.mechanism import Mechanism, rotor_mass
 from paraflex.mechanism.quantities import known
 from paraflex.units import WHERE_IT_SLIDES
 from .formulas import drift_speed, largest_norm, overshoot, rms, settling_time, vibration
+from .metric_expressions import MetricExpression, parsed
+from .motion_quantities import JOINT_LOADS, MOTOR_WORDS, Quantity, is_load, quantity_named
+from .stress import stress_at
 from .traces import Trace
 
 if TYPE_CHECKING:
@@ -29,15 +37,75 @@ if TYPE_CHECKING:
 PATH, MOTION, STATICS = "path", "motion", "statics"
 # Kinds of members with one value of a metric each; equilibria have named coordinates, and those with a stiffness.
 MOTOR, DRIVE, JOINT, COORDINATE, DIRECTION = "motor", "drive", "joint", "coordinate", "direction"
-# Functions of an expression, applied to a coordinate over all steps.
-_TAKEN = {"max": np.max, "min": np.min, "mean": np.mean, "last": lambda values: values[-1]}
-_EXPRESSION = re.compile(
-    rf"(?P<taken>{'|'.join(_TAKEN)})\((?P<magnitude>abs\()?((?P<trace>travel|effort|stiffness|compliance)\.)?"
-    r"(?P<member>[^()]+)\)(?(magnitude)\))"
-)
-_EXPRESSIONS = f"{', '.join(_TAKEN)}, abs, and travel (or nothing), effort, stiffness or compliance of a coordinate"
-# Names of a mechanism's members by their kind, and of those that slide by `sliding(kind)`.
-Members = Mapping[str, Sequence[str]]
+# Quantities of a coordinate of equilibria in expressions; the first is that of the coordinate alone.
+_OF_COORDINATES = ("travel", "effort", "stiffness", "compliance")
+
+
+class MetricMembers(dict[str, Sequence[str]]):
+    """Names of a mechanism's members by their kind, and of those that slide by `sliding(kind)`.
+
+    The members are motors, drives (prescribed motions) and joints; in equilibria they are the named coordinates, and
+    those with a stiffness.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+        Mechanism of the members.
+    given : Conditions, optional
+        Conditions of equilibria.
+    """
+
+    def __init__(self, mechanism: Mechanism, given: Conditions | None = None) -> None:
+        self.mechanism = mechanism
+        if given is not None:
+            straight = tuple(one.name for one in given.coordinates if one.unit == "m")
+            coordinates = {COORDINATE: given.coordinates, DIRECTION: given.measured}
+            names = {kind: tuple(one.name for one in each) for kind, each in coordinates.items()}
+            super().__init__(names | {sliding(kind): straight for kind in names})
+            return
+        found = {MOTOR: mechanism.motors, DRIVE: mechanism.prescribed, JOINT: mechanism.joints}
+        slides = {joint.name for joint in mechanism.joints if joint.slides}
+        super().__init__(
+            {kind: tuple(one.name for one in each) for kind, each in found.items()}
+            | {
+                sliding(kind): tuple(one.name for one in each if getattr(one, "joint", one.name) in slides)
+                for kind, each in found.items()
+            }
+        )
+
+    def quantity(self, name: str) -> Quantity:
+        """Return a quantity of the runs by its name; the name of a coordinate of equilibria stands for its travel.
+
+        Raises
+        ------
+        InputError
+            There is no such quantity.
+        """
+        if COORDINATE not in self:
+            return quantity_named(name, self.mechanism)
+        trace, _, member = name.partition(".")
+        if trace not in _OF_COORDINATES:
+            if name not in self[COORDINATE] and is_load(name):
+                return quantity_named(name, self.mechanism)
+            trace, member = _OF_COORDINATES[0], name
+        metric = METRICS[trace]
+        known(member, self[metric.each], "metrics", metric.each)
+        at = list(self[metric.each]).index(member)
+        unit = WHERE_IT_SLIDES[metric.unit] if member in self[sliding(metric.each)] else metric.unit
+        return Quantity(unit, lambda run, _: getattr(run, trace)[:, at])
+
+    def expression(self, text: str) -> MetricExpression:
+        """Return the expression of a metric; names of coordinates of equilibria need no quotes."""
+        for name in self.get(COORDINATE, ()):
+            if not all(part.isidentifier() for part in name.split(".")):
+                whole = rf"(?<![\w.'\"])((?:{'|'.join(_OF_COORDINATES)})\.)?{re.escape(name)}(?![\w.'\"])"
+                text = re.sub(whole, lambda found: repr(found[0]), text)
+        found = parsed(text)
+        if COORDINATE in self and found.in_time:
+            raise ExpressionError("equilibria have no time", "leave out windows and integrals")
+        return found
+
+
 # Function of the traces of a run and of the nominal run. It may use attributes that only some traces have
 # (`RunTraces`).
 Formula = Callable[[Any, Any], Any]
@@ -76,8 +144,6 @@ class Metric:
         Kinds of runs for which the metric is kept unless metrics are named; by default all that have it.
     ranked : bool
         Whether a smaller value is better, so that designs can be selected by the metric.
-    member : str
-        Single member of an expression; empty for other metrics.
     """
 
     name: str
@@ -94,33 +160,59 @@ class Metric:
     of_motors: bool = False
     kept_of: tuple[str, ...] | None = None
     ranked: bool = True
-    member: str = ""
 
     def value(self, traces: Any) -> Any:
         """Return the metric of a run; an array for a metric of each motor, drive or joint."""
         return self.formula(traces, traces)
 
-    def columns(self, members: Members) -> list[str]:
+    def columns(self, members: MetricMembers) -> list[str]:
         """Return the names of the metric's columns: NAME, or NAME.MEMBER for each motor or other member.
 
         Raises
         ------
         InputError
-            The member of an expression does not exist.
+            An expression does not fit the mechanism.
         """
-        if self.member:
-            known(self.member, members.get(self.each, ()), "metrics", self.each)
-            return [self.name]
         return [f"{self.name}.{member}" for member in members.get(self.each, ())] if self.each else [self.name]
 
     def is_kept_of(self, runs: str) -> bool:
         """Check whether the metric is kept for a kind of runs unless metrics are named."""
         return runs in (self.runs if self.kept_of is None else self.kept_of)
 
-    def unit_of(self, column: str, members: Members) -> str:
+    def unit_of(self, column: str, members: MetricMembers) -> str:
         """Return the unit of one of the metric's columns, for a sliding member that of the translational quantity."""
-        slides = (self.member or column.partition(".")[2]) in members.get(sliding(self.each), ())
+        slides = column.partition(".")[2] in members.get(sliding(self.each), ())
         return WHERE_IT_SLIDES.get(self.unit, self.unit) if slides else self.unit
+
+
+class ExpressionMetric(Metric):
+    """Metric given by an expression, which is its name."""
+
+    def columns(self, members: MetricMembers) -> list[str]:
+        """Return the name of the single column; see `Metric.columns`."""
+        self.unit_of(self.name, members)
+        return [self.name]
+
+    def unit_of(self, column: str, members: MetricMembers) -> str:
+        """Return the unit that follows from the expression."""
+        with expressed_in("metrics", self.name):
+            return members.expression(self.name).unit(lambda name: members.quantity(name).unit)
+
+
+def _of_expression(text: str, run: Any, nominal: Any) -> Any:
+    """Return the value of an expression for the traces of a run, with its derivative if the run has a complex step."""
+    members = MetricMembers(nominal.system.described, nominal.conditions)
+
+    def jet(of: Callable[[Any, Any], Trace]) -> Jet:
+        here = of(run, nominal)
+        value = of(nominal, nominal) if np.iscomplexobj(here) else here
+        return Jet(value, np.imag(here), np.zeros_like(value))
+
+    expression = members.expression(text)
+    found = expression.value(
+        lambda name: jet(members.quantity(name).of), lambda: jet(lambda traces, _: traces.solution.t)
+    )
+    return found.value + 1j * found.rate if np.any(found.rate) else found.value
 
 
 class _Metrics(dict[str, Metric]):
@@ -132,20 +224,10 @@ class _Metrics(dict[str, Metric]):
     def __missing__(self, name: str) -> Metric:
         if "(" not in name:
             raise KeyError(name)
-        found = _EXPRESSION.fullmatch(name.replace(" ", ""))
-        if found is None:
-            raise InputError("no such expression of a metric", field="metrics", value=name,
-                             remedy=f"write max(abs(body.point.y)); {_EXPRESSIONS}")  # fmt: skip
-        taken, magnitude, trace, member = found.group("taken", "magnitude", "trace", "member")
-        base, size, take = self[trace or "travel"], np.abs if magnitude else np.asarray, _TAKEN[taken]
-
-        def value(run: Any, _: Any) -> Any:
-            here = run.run.coordinates if base.each == COORDINATE else run.run.directions
-            column = getattr(run, base.name)[:, [one.name for one in here].index(member)]
-            return take(size(column))
-
-        meaning = f"{name} of {base.name} in all steps, with its sign unless by abs"
-        return replace(base, name=name, meaning=meaning, formula=value, label=name, kept_of=(), member=member)
+        with expressed_in("metrics", name):
+            parsed(name)
+        meaning = f"{name}, from the samples"
+        return ExpressionMetric(name, meaning, "", partial(_of_expression, name), name, runs=_ANY, kept_of=())
 
 
 def metric_name(column: str) -> str:
@@ -153,12 +235,37 @@ def metric_name(column: str) -> str:
     return column if "(" in column else column.partition(".")[0]
 
 
+def keep_metrics(data: xr.Dataset, figures: Mapping[str, Any]) -> None:
+    """Store values and units of metrics by name of the run, which is empty for a single one, in a dataset."""
+    data.attrs["metrics"] = json.dumps(figures)
+
+
+def kept_metrics(data: xr.Dataset, run: str = "") -> dict[str, Any]:
+    """Return `metrics` with what `keep_metrics` stored of a run; empty if nothing was stored."""
+    found = json.loads(data.attrs.get("metrics", "{}")).get(run)
+    return {"metrics": found} if found else {}
+
+
+def metric_until(name: str) -> float:
+    """Return the latest time that the windows of a metric by expression name [s]; 0 for other metrics."""
+    return parsed(name).until if "(" in name else 0.0
+
+
+def has_loads(name: str, mechanism: Mechanism) -> bool:
+    """Check whether a metric is an expression of loads of joints or beams, or of efforts of prescribed motions."""
+    quantities = [each.rpartition(".")[::2] for each in parsed(name).quantities] if "(" in name else []
+    driven = {place for one in mechanism.prescribed for place in (one.name, one.joint)}
+    return any(
+        word in (*JOINT_LOADS, "stress") or (owner in driven and word in MOTOR_WORDS) for owner, word in quantities
+    )
+
+
 def sliding(each: str) -> str:
-    """Return the key in `Members` for the sliding members of a kind."""
+    """Return the key in `MetricMembers` for the sliding members of a kind."""
     return f"sliding {each}"
 
 
-def metric_unit(column: str, members: Members) -> str:
+def metric_unit(column: str, members: MetricMembers) -> str:
     """Return the unit of a column for a mechanism with these members."""
     return METRICS[metric_name(column)].unit_of(column, members)
 
@@ -241,10 +348,7 @@ def _stress_where(used_up: Callable[[Any], Trace]) -> Formula:
         if not np.isfinite(most).any():
             return np.nan
         k, s = np.unravel_index(np.nanargmax(most), most.shape)
-        bending = np.sign(nominal_loads.moment[k, s]) * loads.moment[k, s] / loads.modulus[k, s]
-        force = nominal_loads.force[k, s]
-        axial = 0.0 if np.isnan(force) else np.sign(force) * loads.force[k, s] / loads.area[k, s]
-        return (bending + axial) / used_up(loads)[k, s]
+        return stress_at(loads, nominal_loads, (k, s)) / used_up(loads)[k, s]
 
     return value
 

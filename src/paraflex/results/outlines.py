@@ -100,14 +100,14 @@ def chord_deflections(mechanism: Mechanism, shape: Array) -> Array:
     return np.stack(found, axis=1)
 
 
-def deflections(system: System, q: Array) -> Array:
-    """Return the signed deflections of the stations of all flexible bodies from their chords (k, stations) [m].
+def deflections(system: System, q: Array, name: str = "") -> Array:
+    """Return the signed deflections of the stations of all flexible bodies, or of one, from their chords (k, s) [m].
 
     They are real or complex like q; see `across_chord` for signs, `chord_deflections` for NaN.
     """
     parts = [np.zeros((len(q), 0))]
     for body, one in zip(system.described.bodies, outlines(system.described), strict=True):
-        if system.body(body.name).nf:
+        if name in ("", body.name) and system.body(body.name).nf:
             whole = system.parts(one.body) == (one.body,)
             bent = across_chord((_in_frame if whole else outline_motion)(system, one, q), one.places)
             parts.append(bent if len(one.places) >= _LEAST_ON_LINE else np.full_like(bent, np.nan))

@@ -14,7 +14,7 @@ from .findings import validity_summary, verdict_of
 from .following import FOLLOWING, ErrorSpan, part_run
 from .kinds import RUN_FIGURES, check_kind
 from .loads import load_figures
-from .metrics import METRICS
+from .metrics import METRICS, kept_metrics
 from .numbers import by_label, finite_or_none, plain
 from .reduced_runs import reduced_run_figures
 from .sensors import sensor_figures
@@ -46,12 +46,13 @@ def summary(data: xr.Dataset, failed: dict[str, str] | None = None) -> dict[str,
     dict
         `modes.<mode>` with tracking errors during the motion, after it and over the whole run, vibration and drift,
         peak_torque and rms_torque per motor, end_effector_final, the solver's figures, validity (None for rigid bodies)
-        and `loads` (see `load_figures`); also `sensors` of mechanisms with sensors (`sensor_figures`), `reduction` of
-        reduced bodies (`reduced_run_figures`), `controllers` and internal_torque_max [N m] (`controller_figures`).
-        `beside` has the tracking errors in another geometry, if the study ran it as well (`Beside`).
-        `tolerance` [m] of the integration; `error`, the time span of the error that ranks the modes; `verdict`, with
-        level and all findings; `after`, the state of the motors after the path; `part`, the part of the path covered by
-        runs that ended before it, else None; `parameters`; `version`. Values that a run did not reach are None.
+        and `loads` (see `load_figures`); also `metrics` that were asked for, with value and unit, `sensors` of
+        mechanisms with sensors (`sensor_figures`), `reduction` of reduced bodies (`reduced_run_figures`), `controllers`
+        and internal_torque_max [N m] (`controller_figures`). `beside` has the tracking errors in another geometry, if
+        the study ran it as well (`Beside`). `tolerance` [m] of the integration; `error`, the time span of the error
+        that ranks the modes; `verdict`, with level and all findings; `after`, the state of the motors after the path;
+        `part`, the part of the path covered by runs that ended before it, else None; `parameters`; `version`. Values
+        that a run did not reach are None.
 
     Raises
     ------
@@ -78,6 +79,7 @@ def summary(data: xr.Dataset, failed: dict[str, str] | None = None) -> dict[str,
         numbers["actuation_condition_max"] = finite_or_none(METRICS["actuation_condition_max"].value(traces))
         numbers |= {"validity": validity_summary(run), "loads": load_figures(run)}
         numbers |= sensor_figures(run) | reduced_run_figures(run) | controller_figures(run)
+        numbers |= kept_metrics(data, str(name))
         modes[str(name)] = numbers
     modes |= {name: {"status": "failed", "message": reason} for name, reason in (failed or {}).items()}
     beside = beside_of(data)
@@ -118,6 +120,7 @@ def motion_summary(data: xr.Dataset) -> dict[str, Any]:
         **numbers,
         "verdict": verdict_of(data).to_dict(),
         "validity": validity_summary(data),
+        **kept_metrics(data),
         **sensor_figures(data),
         **reduced_run_figures(data),
         **controller_figures(data),

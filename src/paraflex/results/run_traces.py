@@ -11,10 +11,20 @@ from paraflex.control.laws.joints import internal_torques
 from paraflex.control.loop.run_loop import ControllerRecord
 from paraflex.control.loop.runs import ControlledMotion, ControlledTracking
 from paraflex.dynamics import System, joint_coordinate
-from paraflex.dynamics.joint_loads import LoadComponents, drive_torques, joint_loads, load_errors, undetermined_loads
-from paraflex.equilibria.conditions import Coordinate
+from paraflex.dynamics.joint_loads import (
+    LoadComponents,
+    Loads,
+    drive_torques,
+    joint_loads,
+    load_errors,
+    undetermined_loads,
+)
+from paraflex.dynamics.points import PointMotion, point_motion
+from paraflex.dynamics.quasi_static import joint_accelerations
+from paraflex.equilibria.conditions import Conditions, Coordinate
 from paraflex.equilibria.result import Statics
 from paraflex.integrators import Solution
+from paraflex.mechanism import PointRef
 from paraflex.motion import MotionRun
 from paraflex.tracking import TrackingRun
 from paraflex.validity import Validity
@@ -81,9 +91,40 @@ class SolutionTraces(Generic[R]):
         Multipliers near singular positions, where they have a pole, are taken as zero. The force is NaN if redundant
         constraints share it.
         """
+        return length(self.joint_loads.force)
+
+    @cached_property
+    def joint_loads(self) -> Loads:
+        """Forces (k, joints, 2) [N] and moments (k, joints) [N m] of all joints, with NaN as in `joint_force`."""
         multipliers = np.where(np.isnan(self.solution.multipliers), 0.0, self.solution.multipliers)
-        force = joint_loads(self.system, self._joints, self.solution.q, multipliers, self.torque).force
-        return np.where(self._undetermined.force.any(axis=2), np.nan, length(force))
+        loads = joint_loads(self.system, self._joints, self.solution.q, multipliers, self.torque)
+        unknown = self._undetermined
+        force = np.where(unknown.force.any(axis=2, keepdims=True), np.nan, loads.force)
+        return Loads(force, np.where(unknown.moment, np.nan, loads.moment))
+
+    def joint_quantity(self, name: str, word: str) -> Trace:
+        """Return a quantity of a joint at all samples (k,) in SI units, by its word.
+
+        The words are "angle" or "travel", "rate", "acceleration", "force" (its magnitude), "fx", "fy" and "moment".
+        """
+        if word in ("force", "fx", "fy", "moment"):
+            k, (force, moment) = self._joints.index(name), self.joint_loads
+            each = {"force": length(force[:, k]), "fx": force[:, k, 0], "fy": force[:, k, 1], "moment": moment[:, k]}
+            return each[word]
+        solution = self.solution
+        if word == "acceleration":
+            return joint_accelerations(self.system, name, solution.q, solution.v, solution.a)[2]
+        found = joint_coordinate(self.system, name, solution.q, solution.v)
+        return found.rate if word == "rate" else found.value
+
+    def point_motion(self, point: PointRef) -> PointMotion:
+        """Return the motion of a point of a body at all samples."""
+        return point_motion(self.system, point, self.solution.q, self.solution.v, self.solution.a)
+
+    @property
+    def conditions(self) -> Conditions | None:
+        """Conditions of equilibria; None for other runs."""
+        return None
 
     @cached_property
     def load_errors(self) -> LoadComponents:
@@ -185,6 +226,11 @@ class StaticsTraces(SolutionTraces[Statics]):
     def system(self) -> System:
         """System with the additional constraint rows of held, moved and loaded coordinates."""
         return self.run.equations.extended
+
+    @property
+    def conditions(self) -> Conditions:
+        """Conditions of the equilibria."""
+        return self.run.equations.conditions
 
     @property
     def torque(self) -> Trace:  # pyright: ignore[reportIncompatibleVariableOverride]

@@ -16,7 +16,7 @@ from paraflex.designs.run import STATUSES
 from paraflex.figures.laws import metrics_of
 from paraflex.folders import LAW_COMPARISON
 from paraflex.results.export import export, result_tables
-from paraflex.results.metrics import METRICS, Members, metric_unit
+from paraflex.results.metrics import METRICS, MetricMembers, metric_name, metric_unit
 from paraflex.results.numbers import finite_or_none
 
 if TYPE_CHECKING:
@@ -138,7 +138,7 @@ def law_dataset(
     modes: Sequence[str],
     cells: Mapping[tuple[str, str], Row],
     metrics: Sequence[str],
-    members: Members,
+    members: MetricMembers,
     attrs: Mapping[str, Any],
 ) -> xr.Dataset:
     """Build the dataset of a comparison from its cells.
@@ -154,7 +154,7 @@ def law_dataset(
     metrics : sequence of str
         Columns of the metrics.
     members : mapping
-        Members of the mechanism; see `designs.measure.members_of`.
+        Members of the mechanism; see there.
     attrs : mapping
         Attributes of the dataset, its provenance.
     """
@@ -166,7 +166,7 @@ def law_dataset(
 
     data = xr.Dataset(coords={"law": np.array(list(laws), dtype=str), "mode": np.array(list(modes), dtype=str)})
     for column in metrics:
-        meaning = METRICS[column.partition(".")[0]].meaning
+        meaning = METRICS[metric_name(column)].meaning
         data[column] = (_ROWS, numbers(column), {"units": metric_unit(column, members), "long_name": meaning})
     for name, meaning in _OUTCOME.items():
         texts = np.array([[row.get(name, "") for row in each] for each in rows], dtype=str)

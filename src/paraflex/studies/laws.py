@@ -13,7 +13,7 @@ from paraflex.arguments import CheckedFields, checked_arguments, refused
 from paraflex.campaign import THREADS, LostWorker, OnProgress, Progress, Result, Row, WholeStudy, Workers, outcomes
 from paraflex.control.laws.described import NONE, ControllerDescription
 from paraflex.control.loop.chain import SampledController
-from paraflex.designs.measure import members_of, metrics_of
+from paraflex.designs.measure import metrics_of
 from paraflex.designs.run import along_path, measured_mode
 from paraflex.errors import InputError
 from paraflex.files import Model, load
@@ -22,7 +22,7 @@ from paraflex.mechanism import ActuationMode
 from paraflex.reduced_bodies import reduced_task
 from paraflex.results.following import HEADLINE, ErrorSpan
 from paraflex.results.labelled import provenance
-from paraflex.results.metrics import METRICS
+from paraflex.results.metrics import METRICS, MetricMembers
 from paraflex.tracking import TrackingTask
 from .law_comparison import OPEN_LOOP, LawComparison, law_dataset
 
@@ -140,7 +140,7 @@ class LawStudy(WholeStudy[LawComparison], CheckedFields):
     def _dataset(self, modes: Sequence[str], found: Mapping[Cell, Row]) -> Any:
         mechanism, options = self._task.mechanism, self.options or IntegrationOptions()
         laws = {name: ([one.name for one in self.laws[law]], path) for name, (law, path) in self.rows.items()}
-        members = members_of(mechanism)
+        members = MetricMembers(mechanism)
         columns = [column for name in self.metrics for column in METRICS[name].columns(members)]
         about = provenance(self._task.system, options.method.title, options, self.parameters) | {
             "error": self.error.value

@@ -16,7 +16,7 @@ from paraflex.arrays import Array
 from paraflex.campaign import OnProgress, Progress, Result, WholeStudy, Workers, no_workers
 from paraflex.designs.derivatives.gradient import ModeGradients, mode_gradients
 from paraflex.designs.derivatives.plans import check_has_path, nominal_values
-from paraflex.designs.measure import SMOOTH, check_metric, check_smooth, metric_of, smooth_metrics
+from paraflex.designs.measure import SMOOTH, check_metric, check_smooth, smooth_metrics
 from paraflex.designs.run import Task
 from paraflex.designs.samples import SweptParameter
 from paraflex.designs.schema import StudyFile, SweepTable, study_table
@@ -25,6 +25,7 @@ from paraflex.errors import InputError
 from paraflex.findings import Verdict
 from paraflex.folders import SENSITIVITY
 from paraflex.mechanism.quantities import known
+from paraflex.results.metrics import MetricMembers, metric_unit
 from paraflex.results.numbers import finite_or_none
 from paraflex.results.tables import spreadsheet_text, write_parquet
 from paraflex.writing import whole_file
@@ -226,7 +227,7 @@ class SensitivityStudy(WholeStudy[Sensitivities]):
             for each in mode_gradients(setting, Task(number, 0, values, path), sizes):
                 rows.append((path, each.mode))
                 found.append(each)
-        columns = tuple(found[0].gradients)
+        columns, members = tuple(found[0].gradients), MetricMembers(setting.design(values)[0].mechanism)
         return Sensitivities(
             name=self.name,
             mechanism=setting.source,
@@ -235,7 +236,7 @@ class SensitivityStudy(WholeStudy[Sensitivities]):
             nominal=np.array(values),
             fields=tuple(parameter.fields for parameter in self.parameters),
             metrics=columns,
-            units=tuple(metric_of(name).unit for name in columns),
+            units=tuple(metric_unit(name, members) for name in columns),
             values=np.array([[each.values[name] for name in columns] for each in found]),
             derivatives=np.array([[each.gradients[name] for name in columns] for each in found]),
             errors=np.array([[each.errors[name] for name in columns] for each in found]),

@@ -16,6 +16,7 @@ from paraflex.arguments import CheckedFields, checked_arguments, refused
 from paraflex.campaign import THREADS, OnProgress, Progress, Result, WholeStudy, Workers
 from paraflex.campaign.workers import Calls
 from paraflex.control import ControllerDescription, simulate_controlled
+from paraflex.designs.measure import metric_figures, metrics_of
 from paraflex.display import Played
 from paraflex.dynamics.sparse import stiffness_diagonal
 from paraflex.errors import ControllerError, InputError, IntegrationError, NumericalError
@@ -27,6 +28,7 @@ from paraflex.reduced_bodies import Reduction, size_of
 from paraflex.results import summary, tracking_dataset
 from paraflex.results.beside import with_beside
 from paraflex.results.following import ErrorSpan
+from paraflex.results.metrics import PATH, keep_metrics
 from paraflex.results.reduced_runs import compared_with_full, with_estimate
 from paraflex.tracking import TrackingRun, TrackingTask, simulate
 
@@ -123,11 +125,13 @@ class TrackingStudy(WholeStudy[StudyResult], CheckedFields):
         default method, and the results contain the tracking errors beside those of `task`.
     elsewhere : mapping
         Tracking errors from other sources shown with them, by geometry, source and mode [m].
+    metrics : sequence of str
+        Metrics, or expressions of metrics, of every complete run; stored with the results.
 
     Raises
     ------
     InputError
-        Unknown mode, or workers that are not threads; raised by `run` before anything runs.
+        Unknown mode or metric, or workers that are not threads; raised by `run` before anything runs.
     """
 
     _own = ("method",)
@@ -145,6 +149,7 @@ class TrackingStudy(WholeStudy[StudyResult], CheckedFields):
     reduction: Reduction | None = None
     beside: TrackingTask | None = None
     elsewhere: Mapping[str, Any] = field(default_factory=dict)
+    metrics: Sequence[str] = ()
 
     def _prepare(self, workers: Workers | None) -> Callable[[OnProgress | None], StudyResult]:
         if self.method is not None and not callable(self.method):
@@ -157,6 +162,7 @@ class TrackingStudy(WholeStudy[StudyResult], CheckedFields):
         if workers.engine != THREADS:
             raise InputError("modes run in threads", field="workers", value=workers.engine, remedy="leave it out")
         chosen = list(dict.fromkeys(self.task.mode(mode) for mode in self.modes))
+        metrics_of(self.metrics, self.error, self.task.mechanism, PATH, float(self.task.motion.t[-1]))
         return partial(self._run, chosen, workers)
 
     def _run(self, chosen: Sequence[ActuationMode], workers: Workers, on_progress: OnProgress | None) -> StudyResult:
@@ -241,6 +247,8 @@ class TrackingStudy(WholeStudy[StudyResult], CheckedFields):
             geometries = self.task.mechanism.geometry.value, self.beside.mechanism.geometry.value
             found = tracking_dataset(beside, options=self._options_beside, error=self.error)
             data = with_beside(data, found, geometries, self.elsewhere)
+        if data is not None and self.metrics:
+            keep_metrics(data, {run.mode.name: metric_figures(run, self.metrics) for run in runs})
         return StudyResult(data, failed, interrupted)
 
     @property

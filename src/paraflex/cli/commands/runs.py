@@ -63,6 +63,9 @@ class RunRequest:
         "--constraints baumgarte|projection|ggl", "Treatment of the constraints. Default: the method's."
     )
     automatic_gains: bool = switch("--automatic-gains", "Adapt the Baumgarte coefficients to the step.")
+    metrics: list[str] = repeatable(
+        "--metric EXPRESSION", 'A number of each complete run: a metric of studies, or "max(abs(A1.rate))"; repeatable.'
+    )
     stop_at: list[str] = repeatable(
         "--stop-at EVENT",
         "Event that ends the run: joint:NAME=LOW..HIGH, deflection:BODY=METRES, singular=DISTANCE, "

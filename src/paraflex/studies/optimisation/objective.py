@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -14,7 +15,7 @@ WORST, MEAN = "worst", "mean"
 
 @dataclass(frozen=True)
 class Objective(Brief):
-    """Objective function, a weighted sum of metrics, with upper limits of metrics.
+    """Objective function, a weighted sum of metrics and of squared differences from targets, with limits of metrics.
 
     Attributes
     ----------
@@ -26,60 +27,83 @@ class Objective(Brief):
         Whether each metric is divided by its value at the start.
     limits : tuple of (str, float)
         Columns and their upper limits, in the units of the metrics.
+    targets : tuple of (str, float, float)
+        Columns, the values that they shall have, and weights of the squares of their relative differences from these.
     """
 
     weights: Mapping[str, float]
     over: str = WORST
     relative: bool = True
     limits: tuple[tuple[str, float], ...] = ()
+    targets: tuple[tuple[str, float, float], ...] = ()
 
     def __post_init__(self) -> None:
         known(self.over, (WORST, MEAN), "objective.over", "way to take all runs together")
 
     @property
     def columns(self) -> tuple[str, ...]:
-        """Columns of the objective and its limits, each once."""
-        return tuple(dict.fromkeys([*self.weights, *(column for column, _ in self.limits)]))
+        """Columns of the objective, its targets and its limits, each once."""
+        others = (column for column, *_ in (*self.targets, *self.limits))
+        return tuple(dict.fromkeys([*self.weights, *others]))
 
     def metrics(self, design: EvaluatedDesign) -> dict[str, float]:
-        """Compute the worst or mean value of every metric."""
-        return {column: float(self._shares(design, column) @ design.metric(column)) for column in self.columns}
+        """Compute the worst or mean value of every metric; of one with a target, the worst is the farthest from it."""
+        worst = dict.fromkeys(self.columns, 0.0) | {column: self._worst(design, column) for column in self.weights}
+        worst |= {column: self._worst(design, column, target) for column, target, _ in self.targets}
+        return worst | {column: self._worst(design, column) for column, _ in self.limits}
 
     def scales(self, start: EvaluatedDesign) -> dict[str, float]:
         """Compute the scales by which metrics are divided, from the design at the start; 1 if not `relative`."""
-        metrics = self.metrics(start)
-        return {column: abs(metrics[column]) if self.relative else 1.0 for column in self.weights}
+        return {column: abs(self._worst(start, column)) if self.relative else 1.0 for column in self.weights}
 
     def value(self, design: EvaluatedDesign, scales: Mapping[str, float]) -> float:
-        """Compute the objective, the sum of weight times metric divided by its scale."""
-        metrics = self.metrics(design)
-        return sum(weight * metrics[column] / scales[column] for column, weight in self.weights.items())
+        """Compute the objective: weight times metric divided by its scale, and weight times squared difference."""
+        total = sum(weight * self._worst(design, column) / scales[column] for column, weight in self.weights.items())
+        for column, target, weight in self.targets:
+            off = design.metric(column) / target - 1.0
+            total += weight * float(self._shares(np.abs(off)) @ off**2)
+        return total
 
     def slope(self, design: EvaluatedDesign, scales: Mapping[str, float], slopes: Mapping[str, Array]) -> Array:
         """Compute the derivatives of `value` (parameters,) from those of the metrics (runs, parameters)."""
         terms = [
-            weight / scales[column] * (self._shares(design, column) @ slopes[column])
+            weight / scales[column] * (self._shares(design.metric(column)) @ slopes[column])
             for column, weight in self.weights.items()
         ]
+        for column, target, weight in self.targets:
+            off = design.metric(column) / target - 1.0
+            terms.append(weight * ((self._shares(np.abs(off)) * 2.0 * off / target) @ slopes[column]))
         return np.sum(terms, axis=0)
 
     def slack(self, design: EvaluatedDesign) -> Array:
         """Compute the margins of metrics to their limits (limits,), relative to the limit (to 1 if it is 0)."""
-        metrics = self.metrics(design)
-        return np.array([(limit - metrics[column]) / (abs(limit) or 1.0) for column, limit in self.limits])
+        return np.array([(limit - self._worst(design, column)) / (abs(limit) or 1.0) for column, limit in self.limits])
 
     def slack_gradient(self, design: EvaluatedDesign, slopes: Mapping[str, Array]) -> Array:
         """Compute the derivatives of `slack` (limits, parameters)."""
-        rows = [-(self._shares(design, column) @ slopes[column]) / (abs(limit) or 1.0) for column, limit in self.limits]
+        rows = [
+            -(self._shares(design.metric(column)) @ slopes[column]) / (abs(limit) or 1.0)
+            for column, limit in self.limits
+        ]
         return np.array(rows)
 
     def violation(self, design: EvaluatedDesign) -> float:
         """Compute the sum of the relative violations of the limits."""
         return float(np.sum(np.maximum(-self.slack(design), 0.0)))
 
-    def _shares(self, design: EvaluatedDesign, column: str) -> Array:
-        """Compute the weight of each run in the worst or mean value of a metric (runs,)."""
+    def to_dict(self) -> dict[str, Any]:
+        """Return the objective as plain values, without targets if it has none."""
+        return {name: value for name, value in vars(self).items() if name != "targets" or value} | {
+            "weights": dict(self.weights)
+        }
+
+    def _worst(self, design: EvaluatedDesign, column: str, target: float | None = None) -> float:
+        """Compute the worst or mean value of a metric."""
         values = design.metric(column)
+        return float(self._shares(values if target is None else np.abs(values - target)) @ values)
+
+    def _shares(self, values: Array) -> Array:
+        """Compute the weight of each run in the worst (largest) or mean of values (runs,)."""
         if self.over == MEAN:
             return np.full(values.size, 1.0 / values.size)
         return np.eye(values.size)[int(np.argmax(values))]

@@ -11,7 +11,7 @@ from paraflex.designs.run import RunTask
 from paraflex.designs.schema import StudyFile, study_table
 from paraflex.designs.units import check_unit_of_metric
 from paraflex.errors import InputError
-from paraflex.results.metrics import Members
+from paraflex.results.metrics import MetricMembers
 from .evaluate import Evaluate, EvaluatedDesign, Session
 from .minimise import DEFAULT_SEARCH, minimise
 from .objective import Objective
@@ -73,7 +73,7 @@ class OptimisationStudy(SearchStudy[OptimisationResult]):
 
     def goal(self) -> dict[str, Any]:
         """Return the objective as plain values."""
-        return {"objective": vars(self.objective) | {"weights": dict(self.objective.weights)}}
+        return {"objective": self.objective.to_dict()}
 
     def _solver(self) -> Solver[OptimisationResult]:
         return _Optimiser(self)
@@ -98,6 +98,7 @@ def load_optimisation(file: StudyFile) -> OptimisationStudy:
             remedy = "write [objective] minimise = { tracking_rms = 1.0 }"
             raise InputError("is missing", field="objective", remedy=remedy)
         columns = {f"objective.minimise.{name}": name for name in table.objective.minimise}
+        columns |= {f"objective.targets.{k}.metric": each.metric for k, each in enumerate(table.objective.targets)}
         columns |= {f"objective.at_most.{k}.metric": each.metric for k, each in enumerate(table.objective.at_most)}
         base = base_study(table, folder, columns)
         objective = _objective(table.objective, base.members)
@@ -131,18 +132,31 @@ def optimise(
     return study.run(folder, workers=Workers.of(workers), on_progress=on_progress, run=run)
 
 
-def _objective(table: ObjectiveTable, members: Members) -> Objective:
-    if not table.minimise:
-        raise InputError("nothing to minimise", field="objective.minimise", remedy="write { tracking_rms = 1.0 }")
-    for column, weight in table.minimise.items():
+def _objective(table: ObjectiveTable, members: MetricMembers) -> Objective:
+    if not table.minimise and not table.targets:
+        raise InputError("nothing to minimise", field="objective.minimise",
+                         remedy="write { tracking_rms = 1.0 }, or add [[objective.targets]]")  # fmt: skip
+    weights = {f"minimise.{column}": weight for column, weight in table.minimise.items()}
+    weights |= {f"targets.{k}.weight": each.weight for k, each in enumerate(table.targets)}
+    for name, weight in weights.items():
         if not weight > 0.0:
-            raise InputError(
-                "must be positive", field=f"objective.minimise.{column}", value=weight, remedy="leave the metric out"
-            )
+            raise InputError("must be positive", field=f"objective.{name}", value=weight, remedy="leave the metric out")
     for k, each in enumerate(table.at_most):
         check_unit_of_metric(each.value, each.metric, members, f"objective.at_most.{k}.value")
+    for k, each in enumerate(table.targets):
+        check_unit_of_metric(each.target, each.metric, members, f"objective.targets.{k}.target")
+        if each.target == 0.0:
+            raise InputError(
+                "nothing is relative to zero", field=f"objective.targets.{k}.target", value=0.0,
+                remedy="minimise the magnitude of the metric instead, as abs(...)",
+            )  # fmt: skip
+        again = each.metric in table.minimise or each.metric in [other.metric for other in table.targets[:k]]
+        if again:
+            raise InputError("the objective has this metric already", field=f"objective.targets.{k}.metric",
+                             value=each.metric, remedy="leave one of them out")  # fmt: skip
     limits = tuple((each.metric, float(each.value)) for each in table.at_most)
-    return Objective(dict(table.minimise), table.over, table.relative, limits)
+    targets = tuple((each.metric, float(each.target), each.weight) for each in table.targets)
+    return Objective(dict(table.minimise), table.over, table.relative, limits, targets)
 
 
 @dataclass

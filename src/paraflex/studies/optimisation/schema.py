@@ -26,10 +26,19 @@ class AtMostTable(FileTable):
     value: NumberOfFields = Field(description="its limit, in the unit of the metric")
 
 
+class SoughtTable(FileTable):
+    """A metric that shall have a value."""
+
+    metric: Text = Field(description="a metric; one per motor as NAME.MOTOR")
+    target: NumberOfFields = Field(description="the value sought, in the unit of the metric")
+    weight: Number = Field(default=1.0, description="weight of the square of its relative difference")
+
+
 class ObjectiveTable(FileTable):
     """The objective."""
 
-    minimise: dict[str, Number] = Field(description="metrics and their weights")
+    minimise: dict[str, Number] = Field(default={}, description="metrics and their weights")
+    targets: list[SoughtTable] = Field(default=[], description="values that metrics shall have, [[objective.targets]]")
     over: Literal["worst", "mean"] = Field(
         default="worst", description='"worst" or "mean" of all paths and modes, of each metric'
     )

@@ -15,11 +15,11 @@ from paraflex.designs.samples import RANDOM, SweptParameter
 from paraflex.designs.schema import SamplingTable
 from paraflex.designs.setting import INTEGRATION, Setting
 from paraflex.designs.sweep import SweepStudy, make_study
-from paraflex.errors import InputError, suggestion
+from paraflex.errors import InputError, renamed, suggestion
 from paraflex.files.overlay import Place, number_at
 from paraflex.limits import DESIGNS, at_most
 from paraflex.mechanism import quantities
-from paraflex.results.metrics import Members
+from paraflex.results.metrics import MetricMembers
 from .schema import GradientsName, MethodName, ParameterTable, SearchTable, StudyTable
 
 
@@ -145,12 +145,12 @@ def base_study(table: StudyTable, folder: FilePath, columns: Mapping[str, str]) 
     def study(metrics: list[str]) -> SweepStudy:
         return make_study(table.model_copy(update={"sampling": sampling, "metrics": metrics}), folder)
 
-    base = study(list(dict.fromkeys([*table.metrics, *counting])) if table.metrics else [])
-    # The default metrics do not include all metrics.
-    missing = [name for name in counting if name not in base.setting.metrics]
-    base = study([*base.setting.metrics, *dict.fromkeys(missing)]) if missing else base
+    base = study(table.metrics)
     for field, column in columns.items():
-        _check_column(field, column, base.members)
+        with renamed(field, only="metrics"):
+            _check_column(field, column, base.members)
+    missing = [name for name in counting if name not in base.setting.metrics]
+    base = study([*(table.metrics or base.setting.metrics), *dict.fromkeys(missing)]) if missing else base
     start = [
         _start(base.setting, places, p, table.vary[p.name].start)
         for p, places in zip(base.parameters, base.setting.places, strict=True)
@@ -167,7 +167,7 @@ def _check_range(field: str, entry: ParameterTable) -> None:
         raise InputError("low and high are equal", field=f"{field}.high", value=entry.high, remedy="leave it out")
 
 
-def _check_column(field: str, column: str, members: Members) -> None:
+def _check_column(field: str, column: str, members: MetricMembers) -> None:
     """Check that a column is one scalar of each run; a metric per motor, drive or joint needs the name of one."""
     metric, known = metric_of(column), metric_of(column).columns(members)
     if column in known:
