@@ -22,6 +22,7 @@ from paraflex.mechanism import (
     Motor,
     PointForce,
     PointRef,
+    PrismaticJoint,
     RevoluteJoint,
     RigidBody,
     TabulatedProfile,
@@ -267,3 +268,17 @@ def test_mistakes_are_named(old, new, says):
     with pytest.raises(InputError) as error:
         read(text)
     assert says in str(error.value)
+
+
+@pytest.mark.parametrize(("force", "told"), [("-9 * arm.B.y", False), ("-9 * (arm.B.x + arm.B.y)", True)])
+def test_forces_without_energy_are_told(force, told):
+    """A force along y by y is a spring; one along y by x has no energy, and no symmetric stiffness."""
+    made = pendulum(loads=(PointForce("hold", PointRef("arm", "B"), (0.0, ForceLaw(force))),), gravity=(0.0, -9.81))
+    joints = (PrismaticJoint("up", PointRef("ground", "O"), PointRef("post", "A"), direction=np.pi / 2), made.joints[0])
+    post = RigidBody("post", 1.0, 0.1, points={"A": (0.0, 0.0)})
+    pin = replace(joints[1], a=PointRef("post", "A"))
+    assembly = Assembly("start", {"arm": 0.5, "post": 0.0})
+    free = replace(made, bodies=(post, *made.bodies), joints=(joints[0], pin), assemblies=(assembly,))
+    assert ("laws-without-energy" in {one.code for one in pf.check(free).findings}) == told
+    found = pf.statics(free, held=["pin"], loads={"up": 1.0}, warning=False)
+    assert ("laws-without-energy" in {one.code for one in found.findings}) == told

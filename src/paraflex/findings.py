@@ -106,6 +106,7 @@ _DOUBTFUL = {
     "reduced-jumps": "Loads jump in a run with few flexible coordinates: joint forces and stresses are uncertain.",
     "modes-too-stiff": "The modes kept of a beam cannot represent a moment applied to it.",
     "equilibrium-unstable": "A static equilibrium is unstable: the mechanism would move away from it.",
+    "laws-without-energy": "Forces over the motion have no energy: frequencies and stability leave out a part of them.",
     "motions-grow": "Some motions about the pose grow instead of vibrating.",
     "axis-along-beam": "A slot or prismatic joint has its straight axis along a flexible beam.",
     "elements-few": "Elements of a beam are too long for a joint that slides along it, or for fast loads or profiles.",

@@ -26,6 +26,7 @@ from paraflex.dynamics import (
 )
 from paraflex.dynamics.linearise import BALANCED as BALANCED, LOWEST
 from paraflex.dynamics.state import point_position
+from paraflex.dynamics.stiffness import laws_without_energy
 from paraflex.errors import NumericalError, ProportionError
 from paraflex.findings import Finding
 from paraflex.limits import OUT_OF_PROPORTION
@@ -179,6 +180,9 @@ def _vibration(seen: Examination, at_rest: bool) -> Iterator[Finding]:
         return
     except NumericalError:
         return
+    if seen.chosen is not None and seen.chosen.state is not None:
+        state = undeformed(seen.system, seen.rigid, seen.chosen.state)
+        yield from laws_without_energy(seen.system, state.time, state.q)
     growing = int(np.sum(vibration.squares < 0.0))
     # A mechanism released out of balance moves off anyway.
     holds = seen.reach.all_motors == seen.mobility.freedoms

@@ -1,18 +1,23 @@
 """Forces at rest and their derivatives by the pose: stiffness of springs, weight, loads and constraint forces."""
 
+from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
 import scipy
 
 from paraflex.arrays import Array, Indices
+from paraflex.findings import Finding
 from paraflex.kernel.packed import CONSTRAINT, FRICTION, INDEX_1, SPRING, PackedSystem, Signals, Workspace
 from paraflex.kernel.stage import equations
 from .inputs import inputs_of
-from .signals import moment_signals
+from .signals import acting_loads, moment_signals
 from .sparse import without_stiffness
 from .system import System
 from .tangents import MotionPoint, Tangency
+
+# Unsymmetric part of a stiffness, relative to the largest entry, that is no rounding.
+_UNSYMMETRIC = 1e-6
 
 
 class RestingForces:
@@ -48,6 +53,24 @@ class RestingForces:
         self.workspace.compliance[:] = scale
         self(q, np.zeros(rows.size))
         return np.divide(self.workspace.rows, scale, out=np.zeros(rows.size), where=rows["kind"] != CONSTRAINT)
+
+
+def laws_without_energy(system: System, time: float, q: Array) -> Iterator[Finding]:
+    """Yield a finding if laws of loads make the stiffness at rest unsymmetric in a pose (n,)."""
+    if not system.packed.laws.size:
+        return
+    without_beams = replace(system, packed=without_stiffness(system.packed))
+    still, acting = np.zeros(system.n), acting_loads(system.mechanism, np.array([time]))[0]
+    K = Tangency(without_beams).stiffness(MotionPoint(time, q, still, still, np.zeros(system.m), acting))
+    units = scipy.sparse.diags(system.units)
+    scaled = scipy.sparse.csr_matrix(units @ K @ units)
+    if abs(scaled - scaled.T).max() > _UNSYMMETRIC * abs(scaled).max():
+        named = [load.name for load in system.mechanism.loads if load.laws]
+        named += [one.name for one in system.mechanism.linear_springs if one.laws]
+        yield Finding(
+            "laws-without-energy", "load", f"{', '.join(named)}: natural frequencies and stability at rest leave out "
+            "the unsymmetric part of their stiffness", "take the poles of `paraflex linearise`, which have all of it",
+        )  # fmt: skip
 
 
 def pose_stiffness(system: System, time: float, q: Array, lam: Array) -> scipy.sparse.csr_matrix:

@@ -13,6 +13,7 @@ from paraflex.dynamics import System
 from paraflex.dynamics.points import point_motion
 from paraflex.dynamics.rank import NO_PART, Dependence, dependence
 from paraflex.dynamics.sparse import stiffness_diagonal
+from paraflex.dynamics.stiffness import laws_without_energy
 from paraflex.errors import InputError, suggestion
 from paraflex.findings import Finding
 from paraflex.integrators import Solution
@@ -206,6 +207,7 @@ class Statics(Shown):
         """Findings: unstable equilibria with their growing motion, stresses beyond the strength, undetermined loads."""
         of_loads = (implausible_stresses, shared_loads)
         stresses = tuple(one for of in of_loads for one in of(self.equations.extended, self.solution))
+        stresses += tuple(laws_without_energy(self.system, self.equations.start.time, self.q[-1]))
         unstable = np.flatnonzero(~self.stable & ~self.limit)
         if not unstable.size:
             return stresses
