@@ -11,7 +11,8 @@ class Inputs(NamedTuple):
     Attributes
     ----------
     motors, loads, prescribed : range
-        Signal numbers in the mechanism's own order; for loads, of the components that are profiles in time.
+        Signal numbers in the mechanism's own order; for loads, of the components that are profiles in time or laws with
+        the time, whose signal is the time itself.
     """
 
     motors: range
