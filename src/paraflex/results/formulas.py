@@ -121,3 +121,14 @@ def _drift(t: Numbers, position: Numbers) -> tuple[Numbers, Numbers, Any]:
     basis = np.stack([np.ones_like(x), x, 1.5 * x**2 - 0.5], axis=1)
     # Normal equations with the plain transpose: well conditioned for Legendre polynomials, and analytic.
     return basis, np.linalg.solve(basis.T @ basis, basis.T @ position), half
+
+
+def stress_at(loads: Any, nominal: Any, at: Any) -> Any:
+    """Return stresses |N| / A + |M| c / I at an index of samples and sections, with the signs of the nominal run [Pa].
+
+    `loads` are `SectionLoads`. The stresses are due to bending alone where the axial force is NaN.
+    """
+    bending = np.sign(nominal.moment[at]) * loads.moment[at] / loads.modulus[at]
+    known = ~np.isnan(nominal.force[at])
+    axial = np.sign(nominal.force[at]) * np.where(known, loads.force[at], 0.0) / loads.area[at]
+    return bending + np.where(known, axial, 0.0)

@@ -17,21 +17,20 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import xarray as xr
 
-from paraflex.equilibria.conditions import Conditions
 from paraflex.expressions.evaluate import ExpressionError, expressed_in
 from paraflex.expressions.jets import Jet
 from paraflex.mechanism import Mechanism, rotor_mass
 from paraflex.mechanism.quantities import known
 from paraflex.units import WHERE_IT_SLIDES
-from .formulas import drift_speed, largest_norm, overshoot, rms, settling_time, vibration
+from .formulas import drift_speed, largest_norm, overshoot, rms, settling_time, stress_at, vibration
 from .metric_expressions import MetricExpression, parsed
 from .motion_quantities import JOINT_LOADS, MOTOR_WORDS, Quantity, is_load, quantity_named
-from .stress import stress_at
 from .traces import Trace
 
 if TYPE_CHECKING:
     from paraflex.actuation import Electrical
     from paraflex.control.loop.run_loop import ControllerRecord
+    from paraflex.equilibria.conditions import Conditions
 
 # Kinds of runs.
 PATH, MOTION, STATICS = "path", "motion", "statics"

@@ -6,13 +6,10 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from paraflex.dynamics.sensors import sensor_readings
-from paraflex.equilibria.conditions import coordinate_named
 from paraflex.errors import InputError, suggestion
 from paraflex.mechanism import AssumedModesBeam, FlexibleBeam, Mechanism, PointRef, RigidBody
 from paraflex.units import EFFORTS
-from .outlines import deflections
-from .stress import stress_at
+from .formulas import stress_at
 from .traces import Trace
 
 # Words of a joint with the units where it turns and where it slides; an empty unit stands for another word.
@@ -148,7 +145,7 @@ def _of_joint(name: str, owner: str, word: str, mechanism: Mechanism) -> Quantit
     slides = mechanism.slides(owner)
     unit = _JOINT_WORDS[word][slides]
     if word not in JOINT_LOADS:
-        coordinate_named(mechanism, owner, "metrics")
+        mechanism.joint(owner).check_moves("metrics")
     if not unit:
         problem, other = ("slides: it has no angle", "travel") if slides else ("turns: it has no travel", "angle")
         raise InputError(f"the joint {problem}", field="metrics", value=name, remedy=f"write {owner}.{other}")
@@ -165,6 +162,8 @@ def _of_body(name: str, owner: str, word: str, mechanism: Mechanism) -> Quantity
 
 
 def _deflection(body: str, run: Any, nominal: Any) -> Trace:
+    from .outlines import deflections  # imported late: it loads the kernels
+
     here, there = (deflections(one.system, one.solution.q, body) for one in (run, nominal))
     at = np.arange(len(there)), np.argmax(np.abs(there), axis=1)
     return np.sign(there[at]) * here[at]
@@ -179,6 +178,8 @@ def _stress(body: str, run: Any, nominal: Any) -> Trace:
 
 
 def _reading(name: str, run: Any, _: Any) -> Trace:
+    from paraflex.dynamics.sensors import sensor_readings  # imported late: it loads the kernels
+
     system, solution = run.system, run.solution
     sensor = [one for one in system.mechanism.sensors if one.name == name]
     torque = run.torque[: len(solution.q)]

@@ -71,17 +71,6 @@ def section_result(system: System, q: Array, v: Array, a: Array, multipliers: Ar
     return SectionResult(replace(sections, bodies=owners, x=sections.x + starts), loads._replace(x=x))
 
 
-def stress_at(loads: SectionLoads, nominal: SectionLoads, at: Any) -> Any:
-    """Return stresses |N| / A + |M| c / I at an index of samples and sections, with the signs of the nominal run [Pa].
-
-    They are due to bending alone where the axial force is NaN; see `SectionLoads.stress`.
-    """
-    bending = np.sign(nominal.moment[at]) * loads.moment[at] / loads.modulus[at]
-    known = ~np.isnan(nominal.force[at])
-    axial = np.sign(nominal.force[at]) * np.where(known, loads.force[at], 0.0) / loads.area[at]
-    return bending + np.where(known, axial, 0.0)
-
-
 def stress_errors(system: System, errors: Array) -> Array:
     """Return bounds of the errors of stresses (bodies,) [Pa], NaN without stresses, from those of coordinates (n,)."""
     bodies, sections = [body.name for body in system.described.bodies], sections_of(system)
