@@ -224,6 +224,25 @@ def read(text=PRESS):
     return model_from(tomllib.loads(text), "press.toml")
 
 
+def test_a_file_over_the_travel_has_columns_in_units(tmp_path):
+    (tmp_path / "stroke.csv").write_text("s [mm], M [N m]\n0, 0\n10, 2\n20, 5\n")
+    text = PRESS.replace('"1000 * guide.travel"', '"guide.travel"').replace(
+        "[[0, 0], [10, 2], [20, 5]]", '"stroke.csv"'
+    )
+    (tmp_path / "press.toml").write_text(text)
+    assert_allclose(pf.load(tmp_path / "press.toml").mechanism.loads[1].torque.table.times, [0.0, 0.01, 0.02])
+    (tmp_path / "stroke.csv").write_text("s [kg], M [N m]\n0, 0\n10, 2\n")
+    with pytest.raises(InputError, match="column 1 of stroke.csv is in kg where m is asked for"):
+        pf.load(tmp_path / "press.toml")
+
+
+def test_rigid_torques_name_a_law_that_is_not_finite():
+    law = '"log((10 mm - guide.travel) / 1 m)"'
+    model = read(PRESS.replace('"-k * max(0, guide.travel - 20 mm) - 30 N s/m * guide.rate"', law))
+    with pytest.raises(InputError, match=r"load.press.force: not a finite number at t = 0\.\d+ s"):
+        pf.torques(model, "guide", start=0.0, end=0.02, speed=0.1)
+
+
 def test_files_hold_laws(tmp_path):
     model = read()
     (force, vertical), torque = model.mechanism.loads[0].force, model.mechanism.loads[1].torque
@@ -257,6 +276,9 @@ def test_files_hold_laws(tmp_path):
         ("bumper.length_rate", "bumber.length_rate", "linear_spring.bumper.force: unknown spring between points"),
         ("bumper.length_rate", "bumper.rate", "linear_spring.bumper.force: unknown joint"),
         ('force = "k * (', 'length = 2 # "', "linear_spring.bumper: gives no force"),
+        ('force = "k * (', 'force = 5 # "', "linear_spring.bumper.force: contains no joint and no point"),
+        ('force = "k * (', 'force = "bumper.length * 1 m" # "', "a quantity in m^2 where one in N is asked for"),
+        ('1000 * guide.travel"\ntable = [[0,', 'guide.travel"\ntable = [["0 kg",', "kg where one in m is asked for"),
         ('point = "ram.B"\nover', 'point = "ram.B"\nreaction = "ram.Q"\nover', "unknown point"),
     ],
 )
