@@ -232,7 +232,7 @@ def test_a_file_over_the_travel_has_columns_in_units(tmp_path):
     (tmp_path / "press.toml").write_text(text)
     assert_allclose(pf.load(tmp_path / "press.toml").mechanism.loads[1].torque.table.times, [0.0, 0.01, 0.02])
     (tmp_path / "stroke.csv").write_text("s [kg], M [N m]\n0, 0\n10, 2\n")
-    with pytest.raises(InputError, match="column 1 of stroke.csv is in kg where m is asked for"):
+    with pytest.raises(InputError, match=r"column 1 of stroke.csv is in kg where m is asked for"):
         pf.load(tmp_path / "press.toml")
 
 
@@ -280,6 +280,11 @@ def test_files_hold_laws(tmp_path):
         ('force = "k * (', 'force = "bumper.length * 1 m" # "', "a quantity in m^2 where one in N is asked for"),
         ('1000 * guide.travel"\ntable = [[0,', 'guide.travel"\ntable = [["0 kg",', "kg where one in m is asked for"),
         ('point = "ram.B"\nover', 'point = "ram.B"\nreaction = "ram.Q"\nover', "unknown point"),
+        (
+            'point = "ram.B"\nover',
+            'point = "ram.B"\nreaction = "ram.B"\nover',
+            "load.stroke.reaction: at its own point",
+        ),
     ],
 )
 def test_mistakes_are_named(old, new, says):
@@ -289,3 +294,10 @@ def test_mistakes_are_named(old, new, says):
     with pytest.raises(InputError) as error:
         read(text)
     assert says in str(error.value)
+
+
+def test_a_parameter_with_a_unit_is_varied_in_its_dimension():
+    study = {"mechanism": read(), "duration": 0.1, "samples": 11, "metrics": ["stress_max"]}
+    assert pf.load_sweep(study | {"vary": {"parameters.k": {"values": ["3 N/mm"]}}}).designs.tolist() == [[3000.0]]
+    with pytest.raises(InputError, match=r"^vary.parameters.k.values: a quantity in m where one in N/m is asked for"):
+        pf.load_sweep(study | {"vary": {"parameters.k": {"values": ["3 km"]}}})
