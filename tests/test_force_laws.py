@@ -225,6 +225,25 @@ def read(text=PRESS):
     return model_from(tomllib.loads(text), "press.toml")
 
 
+def test_a_file_over_the_travel_has_columns_in_units(tmp_path):
+    (tmp_path / "stroke.csv").write_text("s [mm], M [N m]\n0, 0\n10, 2\n20, 5\n")
+    text = PRESS.replace('"1000 * guide.travel"', '"guide.travel"').replace(
+        "[[0, 0], [10, 2], [20, 5]]", '"stroke.csv"'
+    )
+    (tmp_path / "press.toml").write_text(text)
+    assert_allclose(pf.load(tmp_path / "press.toml").mechanism.loads[1].torque.table.times, [0.0, 0.01, 0.02])
+    (tmp_path / "stroke.csv").write_text("s [kg], M [N m]\n0, 0\n10, 2\n")
+    with pytest.raises(InputError, match=r"column 1 of stroke.csv is in kg where m is asked for"):
+        pf.load(tmp_path / "press.toml")
+
+
+def test_rigid_torques_name_a_law_that_is_not_finite():
+    law = '"log((10 mm - guide.travel) / 1 m)"'
+    model = read(PRESS.replace('"-k * max(0, guide.travel - 20 mm) - 30 N s/m * guide.rate"', law))
+    with pytest.raises(InputError, match=r"load.press.force: not a finite number at t = 0\.\d+ s"):
+        pf.torques(model, "guide", start=0.0, end=0.02, speed=0.1)
+
+
 def test_files_hold_laws(tmp_path):
     model = read()
     (force, vertical), torque = model.mechanism.loads[0].force, model.mechanism.loads[1].torque
@@ -258,7 +277,15 @@ def test_files_hold_laws(tmp_path):
         ("bumper.length_rate", "bumber.length_rate", "linear_spring.bumper.force: unknown spring between points"),
         ("bumper.length_rate", "bumper.rate", "linear_spring.bumper.force: unknown joint"),
         ('force = "k * (', 'length = 2 # "', "linear_spring.bumper: gives no force"),
+        ('force = "k * (', 'force = 5 # "', "linear_spring.bumper.force: contains no joint and no point"),
+        ('force = "k * (', 'force = "bumper.length * 1 m" # "', "a quantity in m^2 where one in N is asked for"),
+        ('1000 * guide.travel"\ntable = [[0,', 'guide.travel"\ntable = [["0 kg",', "kg where one in m is asked for"),
         ('point = "ram.B"\nover', 'point = "ram.B"\nreaction = "ram.Q"\nover', "unknown point"),
+        (
+            'point = "ram.B"\nover',
+            'point = "ram.B"\nreaction = "ram.B"\nover',
+            "load.stroke.reaction: at its own point",
+        ),
     ],
 )
 def test_mistakes_are_named(old, new, says):
@@ -282,3 +309,18 @@ def test_forces_without_energy_are_told(force, told):
     assert ("laws-without-energy" in {one.code for one in pf.check(free).findings}) == told
     found = pf.statics(free, held=["pin"], loads={"up": 1.0}, warning=False)
     assert ("laws-without-energy" in {one.code for one in found.findings}) == told
+
+
+def test_a_parameter_with_a_unit_is_varied_in_its_dimension():
+    study = {"mechanism": read(), "duration": 0.1, "samples": 11, "metrics": ["stress_max"]}
+    assert pf.load_sweep(study | {"vary": {"parameters.k": {"values": ["3 N/mm"]}}}).designs.tolist() == [[3000.0]]
+    with pytest.raises(InputError, match=r"^vary.parameters.k.values: a quantity in m where one in N/m is asked for"):
+        pf.load_sweep(study | {"vary": {"parameters.k": {"values": ["3 km"]}}})
+
+
+def test_a_law_that_stops_being_finite_in_a_run_is_named():
+    """A root that has no value beyond 0.2 m, which the mass reaches at its speed then."""
+    made = slider(ForceLaw("1 + sqrt(0.2 - rail.travel)"))
+    with pytest.raises(pf.IntegrationError, match=r"^load\.push\.force has no finite value beyond this state") as error:
+        simulate_motion(made, 3.0, samples=31, options=FINE)
+    assert error.value.partial.q[-1, 0] < 0.2

@@ -5,9 +5,11 @@ from typing import Any
 
 from pydantic import BaseModel
 
+from paraflex.expressions.dimensions import dimensions_of_parameters
 from paraflex.files.fields import Place, check_unit, field_at, leaves, units_at
 from paraflex.files.schema import ModelTable, NumberOfText
 from paraflex.results.metrics import MetricMembers, metric_unit
+from paraflex.units import dimension_text
 from .schema import SweepTable
 
 
@@ -30,7 +32,11 @@ def check_unit_of(data: Mapping[str, Any], place: Place, text: str, field: str) 
         The unit is not that of the number; see `files.fields.check_unit`.
     """
     schema = _schema(place)
-    check_unit(text, {}, units_at(schema, data, place), field, field_at(schema, data, place).description)
+    units = units_at(schema, data, place)
+    # A parameter with a unit keeps its dimension.
+    if place[0] == "parameters" and (own := dimensions_of_parameters(data["parameters"])[str(place[1])]) is not None:
+        units = (dimension_text(own),)
+    check_unit(text, {}, units, field, field_at(schema, data, place).description)
 
 
 def check_unit_of_metric(value: float, column: str, members: MetricMembers, field: str) -> None:

@@ -14,6 +14,7 @@ from paraflex.arguments import checked_arguments, named_in_errors
 from paraflex.arrays import Array
 from paraflex.dynamics import System, build_system, dependence, joint_coordinate, reference_pose, still_signals
 from paraflex.dynamics.joint_coordinates import joint_value, value_text
+from paraflex.dynamics.load_values import check_laws
 from paraflex.dynamics.stiffness import RestingForces
 from paraflex.errors import AssemblyError, InputError, UnreachablePathError
 from paraflex.findings import Finding
@@ -321,7 +322,7 @@ def torques(
     Raises
     ------
     InputError, AssemblyError, UnreachablePathError
-        See `kinematics`; also InputError for a body without mass.
+        See `kinematics`; also InputError for a body without mass, or a law that is not finite at a sample.
     ActuationError, SingularActuationError
         The motors of the mode cannot drive the mechanism along the path.
     """
@@ -331,6 +332,7 @@ def torques(
         mechanism, drive, held=held, path=path, start=start, end=end, speed=speed, duration=duration, samples=samples,
         assembly=assembly,
     )  # fmt: skip
+    check_laws(motion.system, motion.solution.t, motion.solution.q, motion.solution.v)
     effort, name = np.zeros_like(motion.effort), ""
     if motion.rigid is not None:
         known_modes = (*getattr(getattr(mechanism, "study", None), "modes", ()), *source.modes)

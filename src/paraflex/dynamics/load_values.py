@@ -9,6 +9,9 @@ from paraflex.kernel.packed import make_scratch
 from .signals import acting_loads
 from .system import System
 
+# Times after a run has broken down at which its laws are looked at, as fractions of its duration.
+_LATER = np.logspace(-12.0, -3.0, 10)
+
 
 def load_values(system: System, t: Array, q: Array, v: Array) -> Array:
     """Return force [N] and torque [N m] (k, loads, 3) of every load at times (k,) of a motion (k, n)."""
@@ -26,8 +29,8 @@ def line_laws(system: System, q: Array, v: Array) -> Array:
     return found
 
 
-def check_laws(system: System, time: float, q: Array, v: Array) -> None:
-    """Check that the laws of all loads are finite in a state (n,).
+def check_laws(system: System, t: Array, q: Array, v: Array) -> None:
+    """Check that the laws of all loads are finite at times (k,) of a motion (k, n).
 
     Raises
     ------
@@ -36,13 +39,24 @@ def check_laws(system: System, time: float, q: Array, v: Array) -> None:
     """
     if not system.packed.laws.size:
         return
-    found = load_values(system, np.array([time]), q[None], v[None])[0]
+    found = [*load_values(system, t, q, v).swapaxes(0, 1), *line_laws(system, q, v).T[:, :, None]]
     named = [(f"load.{load.name}.{load.kind}", load.laws) for load in system.mechanism.loads]
     named += [(f"linear_spring.{one.name}.force", one.laws) for one in system.mechanism.linear_springs]
-    for (field, laws), values in zip(named, [*found, *line_laws(system, q[None], v[None])[0]], strict=True):
-        if not np.isfinite(values).all():
-            problem, remedy = f"not a finite number at t = {time:g} s", "begin in another pose, or write a finite law"
+    for (field, laws), values in zip(named, found, strict=True):
+        if not (finite := np.isfinite(values).all(axis=1)).all():
+            problem = f"not a finite number at t = {t[~finite][0]:g} s"
+            remedy = "begin in another pose, or write a finite law"
             raise InputError(problem, field=field, value=", ".join(map(str, laws)), remedy=remedy)
+
+
+def law_lost(system: System, time: float, q: Array, v: Array, duration: float) -> str:
+    """Return the field of a law that is not finite soon after a state (n,) in a run of a duration [s]; empty if none."""
+    for later in duration * _LATER if system.packed.laws.size else ():
+        try:
+            check_laws(system, np.array([time + later]), (q + later * v)[None], v[None])
+        except InputError as error:
+            return error.field
+    return ""
 
 
 def largest_loads(system: System, t: Array, q: Array, v: Array) -> list[float]:

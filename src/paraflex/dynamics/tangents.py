@@ -217,7 +217,7 @@ class Tangency:
             compliance, direction, forces, rows,
         )  # fmt: skip
         if system.packed.laws.size and not np.isfinite(forces).all():
-            check_laws(system, point.time, point.q, point.v)
+            check_laws(system, np.array([point.time]), point.q[None], point.v[None])
             members = (*system.mechanism.loads, *system.mechanism.linear_springs)
             laws = [str(law) for one in members for law in one.laws]
             raise InputError("a law has no finite derivative here", field="load", value=", ".join(laws),

@@ -16,7 +16,7 @@ _Of = Callable[[str], Dimension | None]
 
 
 # Units of quantities of a motion by the last part of their names.
-UNITS_OF_QUANTITIES = {"angle": "rad", "travel": "m", "x": "m", "y": "m", "vx": "m/s", "vy": "m/s"}
+UNITS_OF_QUANTITIES = {"angle": "rad", "travel": "m", "x": "m", "y": "m", "vx": "m/s", "vy": "m/s", "length": "m"}
 
 
 def dimension_of(text: str, parameters: Mapping[str, Dimension | None]) -> Dimension | None:

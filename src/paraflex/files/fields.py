@@ -9,8 +9,8 @@ from typing import Any, NamedTuple
 from pydantic import BaseModel
 
 from paraflex.errors import InputError
-from paraflex.expressions.dimensions import dimension_of, dimensions_of_parameters
-from paraflex.expressions.evaluate import ExpressionError, evaluate, expressed_in, names_in
+from paraflex.expressions.dimensions import UNITS_OF_QUANTITIES, dimension_of, dimensions_of_parameters
+from paraflex.expressions.evaluate import ExpressionError, evaluate, expressed_in, names_in, quantity_in, tree_of
 from paraflex.mechanism import JOINT_KINDS
 from paraflex.units import FIELD_UNITS, PLAIN, WHERE_IT_SLIDES, Dimension, dimension_text, quantities_in, unit_named
 
@@ -83,8 +83,9 @@ def units_at(schema: type[BaseModel], data: Mapping[str, Any], place: Place) -> 
     found = field_at(schema, data, place)
     if place[0] in _OF_ANY_UNIT or "unit of" in found.description:
         return None
-    if "table" in place and place[-1] == 0 and value_at(data, (*place[:2], "over")) is not None:
-        return None
+    if "table" in place and place[-1] == 0 and (over := value_at(data, (*place[:2], "over"))) is not None:
+        unit = UNITS_OF_QUANTITIES.get(over.rpartition(".")[2].rstrip("'")) if _is_quantity(over) else None
+        return None if unit is None else (unit,)
     units = _units_in(found.description, _row(data, place), place[-1])
     if place[0] == "gear" and place[-1] == "ratio":
         return _ratio_units(data, place)
@@ -93,6 +94,14 @@ def units_at(schema: type[BaseModel], data: Mapping[str, Any], place: Place) -> 
         return units
     other = WHERE_IT_SLIDES if slides else _WHERE_IT_TURNS
     return tuple(dict.fromkeys(other.get(unit, unit) for unit in units))
+
+
+def _is_quantity(over: Any) -> bool:
+    """Check whether the text of `over` is a quantity of the motion alone."""
+    try:
+        return isinstance(over, str) and quantity_in(tree_of(over)) is not None
+    except ExpressionError:
+        return False
 
 
 def check_units(schema: type[BaseModel], data: Mapping[str, Any]) -> None:

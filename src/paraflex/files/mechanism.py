@@ -253,7 +253,8 @@ def _member(group: Group, name: str, entry: Any, table: ModelTable) -> Any:
             given = read_components(entry, entry.type, evaluate_parameters(table.parameters), table.study.duration)
         return kind(name, entry.point, given[0] if entry.type == "torque" else given, reaction=entry.reaction)
     if values.get("force") is not None:
-        values["force"] = ForceLaw(values["force"], evaluate_parameters(table.parameters))
+        with within(f"{group.table}.{name}"):
+            values["force"] = ForceLaw(str(values["force"]), evaluate_parameters(table.parameters))
     points = [PointRef.parse(point, f"{group.table}.{name}.points") for point in values.pop("points", ())]
     return kind(name, *points, *values.pop("joints", ()), **values)
 

@@ -161,8 +161,8 @@ def _in_si(data: dict[str, Any], place: Place, file: str, headings: str, rows: l
             _, remedy = unknown_unit(f"1 {text}") or ("", 'write units like "ms", "N m" or "deg"')
             raise InputError(f'{where} has the unknown unit "{text}"', field=field, value=heading, remedy=remedy)
         given = overlaid(data, [((*place, "table"), [[0.0] * len(found)])])
-        units = units_at(schema, given, (*place, "table", 0, k)) or ()
-        if unit.dimension not in [unit_named(one).dimension for one in units]:
+        units = units_at(schema, given, (*place, "table", 0, k))
+        if units is not None and unit.dimension not in [unit_named(one).dimension for one in units]:
             raise InputError(
                 f"{where} is in {dimension_text(unit.dimension)} where {' or '.join(units)} is asked for", field=field,
                 value=heading, remedy=f"give it in {' or '.join(units)} or a multiple, or take another column",

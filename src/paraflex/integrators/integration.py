@@ -12,6 +12,7 @@ from paraflex.arguments import checked_arguments
 from paraflex.arrays import Array, brief
 from paraflex.dynamics import State, System, dependence, steep_times
 from paraflex.dynamics.change_points import dependent_drives
+from paraflex.dynamics.load_values import law_lost
 from paraflex.dynamics.system import DENSE_ROWS
 from paraflex.errors import ConstraintDriftError, IntegrationError, Moment, SingularPositionError, SliderOffBeamError
 from paraflex.findings import Finding
@@ -45,6 +46,7 @@ _NEAR = 2e-3
 _PASSING_METHODS = "choose an ESDIRK method, say tr-bdf2 or esdirk4, which pass most singular positions"
 _AROUND = "start or drive the mechanism so that it does not get there"
 _WITHIN_REACH = "prescribe motions that end, or turn back, before it"
+_FINITE_LAW = "write a law that has one wherever the mechanism moves, say with max(0, ...) under a root"
 _SHORTER = "take a shorter step, or leave it out and choose a tolerance"
 _NOT_IN_PARTS = Breakdown("Newton's iteration does not converge in a fixed step, nor in parts of it,", _SHORTER)
 _UNITS_REMEDY = "look for masses, stiffnesses, loads and profiles in a wrong unit"
@@ -334,6 +336,8 @@ class Integration:
                 f"a singular position lies ahead, at about t = {run.singular_ahead:.4g} s, which {options.method.name} "
                 "on index-3 equations cannot be relied on to pass; stopped"
             )
+        elif stopped and (law := law_lost(system, now.t, now.q, now.v, run.problem.times[-1])):
+            cause, remedy = f"{law} has no finite value beyond this state,", _FINITE_LAW
         moment = Moment(now.t, solution.steps + (0 if self._begun is None else self._begun.steps))
         return error(cause, moment, solution, remedy)
 

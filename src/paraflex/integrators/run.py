@@ -181,7 +181,7 @@ def make_problem(
     times = np.ascontiguousarray(times, dtype=float)
     if times.size == 0 or np.any(np.diff(times) <= 0.0) or times[0] < initial.time or times[-1] <= initial.time:
         raise InputError("times must ascend from the start", field="times", remedy="give at least one later time")
-    check_laws(system, initial.time, initial.q, initial.v)
+    check_laws(system, np.array([initial.time]), initial.q[None], initial.v[None])
     inner = np.array([] if knots is None else knots, dtype=float)
     inner = np.unique(inner[(inner > initial.time) & (inner < times[-1])])
     inputs = inputs_of(system.mechanism)

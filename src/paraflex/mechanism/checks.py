@@ -186,6 +186,9 @@ def _check_points_of(mechanism: Members, group: Group, member: Any) -> None:
         if name not in ("a", "b"):
             known_point(mechanism, point, f"{field}.{name}")
             _on_body(point, f"{field}.{name}", "the ground does not move")
+    if "reaction" in points and points["reaction"] == points["point"]:
+        problem, remedy = "at its own point the opposite leaves no load", "name a point of another body"
+        raise InputError(problem, field=f"{field}.reaction", value=str(points["reaction"]), remedy=remedy)
     check_numbers(member, field)
 
 

@@ -100,7 +100,7 @@ class ForceLaw(CheckedFields):
         if not self.quantities:
             raise InputError(
                 "contains no joint and no point", field=self.field, value=self.text,
-                remedy="write slider.travel or stage.T.y, or a profile in time",
+                remedy="name one, say slider.travel, stage.T.y or spring.length",
             )  # fmt: skip
 
     def __str__(self) -> str:

@@ -137,7 +137,9 @@ def flagged(request: object, *, first: bool = False) -> Iterator[None]:
     try:
         yield
     except InputError as error:
-        flag = flags(request).get(error.field.partition(".")[0] if first else error.field.rpartition(".")[2])
+        table, _, name = error.field.partition(".")[0], *error.field.rpartition(".")[1:]
+        # A force of a member is not the option --force.
+        flag = None if table in ("load", "linear_spring") else flags(request).get(table if first else name)
         raise (error if flag is None else error.at(flag)) from None
 
 
