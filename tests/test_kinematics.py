@@ -691,3 +691,9 @@ def test_wrong_requests_are_answered_in_one_line(rocker, tmp_path, words, messag
     (line,) = done.stderr.strip().splitlines()
     assert re.search(message, line)
     assert not (tmp_path / "out").exists()
+
+
+def test_points_that_pause_with_the_whole_mechanism_have_no_cusp():
+    """At the corners of a path all points stop; the followed one has corners there and no cusps."""
+    motion = pf.kinematics(pf.load("five_bar"))
+    assert motion.features.trails["distal1.C"].cusps == ()

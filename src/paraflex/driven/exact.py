@@ -4,7 +4,7 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import scipy
@@ -24,6 +24,8 @@ from paraflex.paths.loops import ClosedLoops, LoopClosure
 _BESIDE = 1.0 / 720.0
 # Deviation beyond a change point from the motion before it, as a part of the move, on the same branch.
 _SAME_BRANCH = 0.05
+# Singular value of constraints that depend on others, relative to the largest, and accuracy of a change point.
+_DEPENDENT = 1e-9
 # Change points that a motion may pass.
 _MOST_PASSED = 100
 Target = Callable[[Array], Array]
@@ -131,9 +133,9 @@ def follow_past(
         after = _continued(loops, before, ends)
         if after is None:
             break
-        passed.append(singular)
         inside = grid[keep & (grid > ends[0]) & (grid <= ends[1])]
         curve = scipy.interpolate.BPoly.from_derivatives(ends, [np.concatenate(before), np.concatenate(after)])
+        passed.append(_most_singular(loops.system, curve, ends))
         between = [curve(inside), *(curve.derivative(order)(inside) for order in (1, 2))]
         parts += [tuple(part[:count] for part in found.arrays), (inside, *between, np.zeros((*between[0].shape, 0)))]
         later = grid > ends[1]
@@ -141,6 +143,21 @@ def follow_past(
         pose = after.q[0]
     arrays = tuple(np.concatenate(each) for each in zip(*parts, found.arrays, strict=True))
     return replace(found, arrays=arrays), passed
+
+
+def _most_singular(system: System, curve: Callable[[float], Array], ends: tuple[float, float]) -> float:
+    """Return the time [s] on a curve q(t) at which rows that are independent at its start come nearest to dependence.
+
+    Loops fail to close somewhat before it.
+    """
+
+    def sizes(t: float) -> Any:
+        return np.linalg.svd(system.dimensionless_jacobian(curve(t)), compute_uv=False)
+
+    first = sizes(ends[0])
+    last = int(np.sum(first > _DEPENDENT * first[0])) - 1
+    near = {"bounds": ends, "method": "bounded", "options": {"xatol": _DEPENDENT * (ends[1] - ends[0])}}
+    return float(scipy.optimize.minimize_scalar(lambda t: sizes(t)[last], **near).x)
 
 
 def state_at(loops: LoopClosure, target: Target, start: float, pose: Array, t: float) -> ExactState:

@@ -296,6 +296,11 @@ def _coupler_points(motion: ExactMotion) -> list[PointRef]:
     return [ref for ref in refs if ref.body not in guides and ref not in taken | guided]
 
 
+def _pace(motion: ExactMotion, v: Array) -> float:
+    """Return the largest speed of any body in velocities (k, n) [sizes of the mechanism/s, rad/s]."""
+    return float(np.max(np.abs(v / motion.system.units)))
+
+
 def _trail(motion: ExactMotion, ref: PointRef) -> Trail:
     """Return cusps and crossings of the path of a point."""
     system, solution = motion.system, motion.solution
@@ -319,7 +324,9 @@ def _trail(motion: ExactMotion, ref: PointRef) -> Trail:
     cusps = []
     for t in sorted(slowest):
         here = there(t)
-        if np.linalg.norm(here.velocity) < _STILL * fastest and not _retraced(motion, there, t):
+        # Where a path pauses, all points do.
+        pauses = _pace(motion, motion.at(t)[1]) < _STILL * _pace(motion, solution.v)
+        if np.linalg.norm(here.velocity) < _STILL * fastest and not pauses and not _retraced(motion, there, t):
             cusps.append(Cusp(_pair(here.position[0]), t, _drive_at(motion, t)))
     crunodes = []
     for t in _crossings(motion, path.position, there):
