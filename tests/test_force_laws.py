@@ -35,6 +35,7 @@ from paraflex.motion import simulate_motion
 from paraflex.paths import Line
 from paraflex.results import tracking_dataset
 from paraflex.tracking import plan_tracking
+from shell import paraflex
 from test_loads import MASS, pendulum
 from test_loads_in_time import K, slider
 
@@ -325,3 +326,13 @@ def test_a_law_that_stops_being_finite_in_a_run_is_named():
     with pytest.raises(IntegrationError, match=r"^load\.push\.force has no finite value beyond this state") as error:
         simulate_motion(made, 3.0, samples=31, options=FINE)
     assert error.value.partial.solution.q[-1, 0] < 0.2
+
+
+@pytest.mark.parametrize("words", [["statics", "--load", "guide=1"], ["linearise", "--force-at", "ram.B"]])
+def test_commands_name_the_file_of_a_law_that_is_not_finite(tmp_path, words):
+    file = tmp_path / "press.toml"
+    law = '"log(-1 - guide.travel / 1 m) * 1 N"'
+    file.write_text(PRESS.replace('"-k * max(0, guide.travel - 20 mm) - 30 N s/m * guide.rate"', law))
+    done = paraflex(words[0], str(file), *words[1:])
+    assert done.returncode == 2
+    assert f"{file}: load.press.force: not a finite number at t = 0 s" in done.stderr

@@ -170,3 +170,13 @@ def located_error(error: InputError, model: Model) -> InputError:
 def conflict(problem: str, flag: str, value: object) -> InputError:
     """Return the error of an option that does not go with another."""
     return InputError(problem, field=flag, value=value, remedy="leave one of them out")
+
+
+@contextmanager
+def naming_laws(model: Model) -> Iterator[None]:
+    """Add the file of a model to errors of its laws of forces raised inside the context."""
+    try:
+        yield
+    except InputError as error:
+        of_law = error.field.startswith(("load.", "linear_spring.")) and not error.source
+        raise (error.in_file(model.source) if of_law else error) from None
