@@ -346,7 +346,7 @@ def blocks_of(record, numbers):
     blocks, at = [], 0
     for part in _parts(record):
         # Matrices of so few rows hold another quantity in each.
-        rows = part.shape[0] if part.ndim == 2 and part.shape[0] <= 6 else 1
+        rows = part.shape[0] if part.ndim == 2 and 0 < part.shape[0] <= 6 else 1
         blocks += np.split(numbers[at : at + part.size], rows)
         at += part.size
     return blocks
