@@ -336,3 +336,12 @@ def test_commands_name_the_file_of_a_law_that_is_not_finite(tmp_path, words):
     done = paraflex(words[0], str(file), *words[1:])
     assert done.returncode == 2
     assert f"{file}: load.press.force: not a finite number at t = 0 s" in done.stderr
+
+
+def test_components_over_different_quantities_have_no_file(tmp_path):
+    """A table over the travel beside a law of its own, beside a table in time, and beside one over another quantity."""
+    table, text = TabulatedProfile((0.0, 1.0), (0.0, 2.0)), "rail.travel"
+    for other in (ForceLaw(text), table, ForceLaw("2 * rail.travel", table=table)):
+        made = slider(0.0, loads=(PointForce("push", PointRef("block", "C"), (ForceLaw(text, table=table), other)),))
+        with pytest.raises(InputError, match=r"^load\.push"):
+            made.save(tmp_path / "no.toml")

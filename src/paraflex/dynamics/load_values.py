@@ -51,11 +51,11 @@ def check_laws(system: System, t: Array, q: Array, v: Array) -> None:
 
 def law_lost(system: System, time: float, q: Array, v: Array, duration: float) -> str:
     """Return the field of a law that is not finite soon after a state (n,) in a run of a duration [s], or ""."""
-    for later in duration * _LATER if system.packed.laws.size else ():
-        try:
-            check_laws(system, np.array([time + later]), (q + later * v)[None], v[None])
-        except InputError as error:
-            return error.field
+    later = duration * _LATER
+    try:
+        check_laws(system, time + later, q + later[:, None] * v, np.repeat(v[None], later.size, axis=0))
+    except InputError as error:
+        return error.field
     return ""
 
 

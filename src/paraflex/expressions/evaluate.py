@@ -70,8 +70,8 @@ def evaluate(text: str, parameters: Mapping[str, float]) -> float:
     ExpressionError
         Syntax error, element that is not allowed, unknown parameter, or value that is not finite.
     """
-    refuse_ambiguous(text, parameters)
-    return _finite(_arithmetic(text, lambda name: _look_up(name, parameters)))
+    _refuse_ambiguous(text, parameters)
+    return _finite(_arithmetic(text, lambda name: look_up(name, parameters)))
 
 
 def evaluate_in_time(text: str, parameters: Mapping[str, float], t: Array) -> Jet:
@@ -167,7 +167,7 @@ def evaluate_parameters(table: Mapping[str, Any]) -> dict[str, float]:
         if name in values or name in CONSTANTS:
             return values.get(name, CONSTANTS.get(name, 0.0))
         if name not in table:
-            raise unknown_name(name, table)
+            raise _unknown(name, table)
         if name in open_names:
             circle = " -> ".join([*open_names[open_names.index(name) :], name])
             raise ExpressionError(f"a cycle of parameters, {circle}", "give one of them a number")
@@ -176,7 +176,7 @@ def evaluate_parameters(table: Mapping[str, Any]) -> dict[str, float]:
             raise ExpressionError("a chain of too many parameters", remedy)
         entry = table[name]
         if isinstance(entry, str):
-            refuse_ambiguous(entry, table)
+            _refuse_ambiguous(entry, table)
             values[name] = _finite(_arithmetic(entry, lambda other: value_of(other, (*open_names, name))))
         else:
             values[name] = _float(entry)
@@ -198,19 +198,23 @@ def evaluate_parameters(table: Mapping[str, Any]) -> dict[str, float]:
 
 
 def _in_time(text: str, parameters: Mapping[str, float], t: Array) -> Any:
-    if TIME_NAME in parameters:
-        raise ExpressionError(
-            f'"{TIME_NAME}" is the time in this expression', f'give the parameter "{TIME_NAME}" another name'
-        )
-
-    refuse_ambiguous(text, parameters)
+    check_names(text, parameters)
 
     def value_of(name: str) -> Any:
-        return Jet.time(t) if name == TIME_NAME else _look_up(name, parameters)
+        return Jet.time(t) if name == TIME_NAME else look_up(name, parameters)
 
     # NumPy's warnings are suppressed, because values that are not finite are reported later with their time.
     with np.errstate(all="ignore"):
         return _arithmetic(text, value_of)
+
+
+def check_names(text: str, parameters: Mapping[str, Any]) -> None:
+    """Raise an ExpressionError if a parameter has the name of the time, or is a unit's divisor in an expression."""
+    if TIME_NAME in parameters:
+        raise ExpressionError(
+            f'"{TIME_NAME}" is the time in this expression', f'give the parameter "{TIME_NAME}" another name'
+        )
+    _refuse_ambiguous(text, parameters)
 
 
 def _finite(value: Any) -> float:
@@ -262,7 +266,7 @@ def _without_units(text: str) -> str:
     return out + text[end:]
 
 
-def refuse_ambiguous(text: str, parameters: Mapping[str, Any]) -> None:
+def _refuse_ambiguous(text: str, parameters: Mapping[str, Any]) -> None:
     """Raise an ExpressionError if a unit of an expression is divided by what is a unit and a parameter."""
     for found in quantities_in(text) if parameters else ():
         for name in sorted(divisors_in(found.unit) & parameters.keys()):
@@ -333,15 +337,16 @@ def allowed_call(name: str, arguments: int) -> None:
         raise ExpressionError(f"{name} takes one argument, not {arguments}", f"write {name}(...)")
 
 
-def _look_up(name: str, parameters: Mapping[str, float]) -> float:
+def look_up(name: str, parameters: Mapping[str, float]) -> float:
+    """Return the value of a parameter or constant; raise an ExpressionError if there is none of this name."""
     if name in parameters:
         return parameters[name]
     if name in CONSTANTS:
         return CONSTANTS[name]
-    raise unknown_name(name, parameters)
+    raise _unknown(name, parameters)
 
 
-def unknown_name(name: str, parameters: Mapping[str, Any]) -> ExpressionError:
+def _unknown(name: str, parameters: Mapping[str, Any]) -> ExpressionError:
     """Return the error for a name that is none of the parameters and constants."""
     if name in FUNCTIONS:
         return ExpressionError(f"{name} is a function", f"write {name}(...)")

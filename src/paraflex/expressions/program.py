@@ -5,16 +5,15 @@ from collections.abc import Mapping
 from typing import NamedTuple
 
 from .evaluate import (
-    CONSTANTS,
     TIME_NAME,
     WITH_KINKS,
     ExpressionError,
     allowed_call,
+    check_names,
+    look_up,
     not_allowed,
     quantity_in,
-    refuse_ambiguous,
     tree_of,
-    unknown_name,
 )
 from .jets import FUNCTIONS
 
@@ -46,13 +45,7 @@ def operations_of(text: str, parameters: Mapping[str, float]) -> tuple[Operation
     ExpressionError
         Syntax error, unknown parameter or function, or parameter with the name of the time.
     """
-    if TIME_NAME in parameters:
-        problem, remedy = (
-            f'"{TIME_NAME}" is the time in this expression',
-            f'give the parameter "{TIME_NAME}" another name',
-        )
-        raise ExpressionError(problem, remedy)
-    refuse_ambiguous(text, parameters)
+    check_names(text, parameters)
     found: list[Operation] = []
 
     def add(operation: Operation) -> int:
@@ -66,9 +59,7 @@ def operations_of(text: str, parameters: Mapping[str, float]) -> tuple[Operation
             case ast.Name(id=name):
                 if name == TIME_NAME:
                     return add(Operation(TIME))
-                if name not in parameters and name not in CONSTANTS:
-                    raise unknown_name(name, parameters)
-                return add(Operation(NUMBER, number=parameters.get(name, CONSTANTS.get(name, 0.0))))
+                return add(Operation(NUMBER, number=look_up(name, parameters)))
             case ast.BinOp(left=number, op=ast.MatMult()):
                 return visit(number)
             case ast.BinOp(left=left, op=op, right=right) if type(op) in _BINARY:

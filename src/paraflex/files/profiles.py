@@ -299,12 +299,14 @@ def components_table(components: Sequence[InMotion], quantity: str) -> dict[str,
     def in_file(values: Sequence[Any]) -> Any:
         return list(values) if quantity == "force" else values[0]
 
-    laws = [each for each in components if isinstance(each, ForceLaw) and each.table is not None]
-    if laws:
-        rest = [each.table if isinstance(each, ForceLaw) and each.text == laws[0].text else each for each in components]
-        if any(isinstance(each, ForceLaw) for each in rest):
+    over = {each.text for each in components if isinstance(each, ForceLaw) and each.table is not None}
+    if over:
+        given = [each.table if isinstance(each, ForceLaw) else each for each in components]
+        columns = [each for each in given if isinstance(each, TabulatedProfile | int | float)]
+        in_time = any(isinstance(each, TabulatedProfile) for each in components)
+        if len(over) > 1 or in_time or len(columns) < len(components):
             raise _unlike(components)
-        return {"over": laws[0].text} | components_table([each for each in rest if each is not None], quantity)
+        return {"over": over.pop()} | components_table(columns, quantity)
     tables = [profile for profile in components if isinstance(profile, TabulatedProfile)]
     pieces = [profile for profile in components if isinstance(profile, PiecewiseProfile)]
     if tables:

@@ -68,8 +68,7 @@ class ForceLaw(CheckedFields):
     text : str
         Expression of parameters, of the time t, and of the quantities JOINT.angle [rad], JOINT.travel [m], JOINT.rate
         [rad/s or m/s], BODY.POINT.x, .y [m], .vx and .vy [m/s], and of springs between points SPRING.length [m] and
-        SPRING.length_rate [m/s]. Besides the functions of profiles in time it may have
-        abs(x), min(x, y) and max(x, y).
+        SPRING.length_rate [m/s]. Besides the functions of profiles in time it may have abs(x), min(x, y) and max(x, y).
     parameters : mapping of str to float
         Values of the parameters.
     table : TabulatedProfile, optional
@@ -95,7 +94,9 @@ class ForceLaw(CheckedFields):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        used = {name: value for name, value in self.parameters.items() if name in self._names}
+        with expressed_in(self.field, self.text):
+            names = names_in(self.text)
+        used = {name: value for name, value in self.parameters.items() if name in names}
         object.__setattr__(self, "parameters", used)
         if not self.quantities:
             raise InputError(
@@ -105,11 +106,6 @@ class ForceLaw(CheckedFields):
 
     def __str__(self) -> str:
         return self.text if self.table is None else f"table over {self.text}"
-
-    @cached_property
-    def _names(self) -> set[str]:
-        with expressed_in(self.field, self.text):
-            return names_in(self.text)
 
     @cached_property
     def operations(self) -> tuple[Operation, ...]:

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -76,7 +77,7 @@ class Posed:
         station = int(self.data["point_station"].values[list(self.data["point"].values).index(str(ref))])
         return self.data["shape"].values[0, station].astype(float)
 
-    @property
+    @cached_property
     def acting(self) -> list[ActingLoad]:
         """Onsets and sizes of all loads over the study."""
         found = enumerate(self.mechanism.loads)
