@@ -1,13 +1,16 @@
 """Modes whose motors follow the planned motion: against rigid inverse dynamics, KED and the plan itself."""
 
+import re
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
 import paraflex as pf
+from paraflex.control.environment import Environment
 from paraflex.dynamics import joint_coordinate
 from paraflex.elastodynamics import simulate_ked
+from paraflex.engines.mujoco import simulate_mujoco
 from paraflex.errors import InputError
 from paraflex.mechanism.actuation_modes import following, parse_mode
 from shell import paraflex
@@ -59,6 +62,67 @@ def test_the_motors_of_a_mode_may_be_fewer_than_there_are():
     assert run.applied[:, [0, 2]].any()
 
 
+def _following(*names):
+    mechanism = pf.load("five_bar").mechanism
+    return replace(
+        mechanism,
+        motors=tuple(replace(one, follows="plan" if one.name in names else None) for one in mechanism.motors),
+    )
+
+
+def test_motors_follow_by_themselves(task):
+    """All motors by their own field are a servo mode; of two, the other gives its planned torque."""
+    both, one = (task.remodelled(_following(*names)) for names in (("left", "right"), ("left",)))
+    run, servo = (pf.simulate(*which, warning=False) for which in ((both, "++"), (task, "++ servo")))
+    assert np.array_equal(run.solution.q, servo.solution.q)
+    assert np.array_equal(run.applied, servo.applied)
+    mixed = pf.simulate(one, "++", warning=False)
+    planned = task.torques("++").evaluate(task.motion.t)
+    assert np.array_equal(mixed.applied[:, 1], planned[:, 1])
+    found = joint_coordinate(mixed.system, "A1", mixed.solution.q).value
+    assert np.max(np.abs(found - joint_coordinate(task.motion.system, "A1", task.motion.q).value)) < 1e-5
+    energy = np.max(mixed.solution.kinetic_energy + mixed.solution.strain_energy)
+    assert mixed.solution.energy_balance_max < 1e-3 * energy
+
+
+def test_a_rigid_mechanism_with_one_following_motor_stays_on_the_path(task):
+    run = pf.simulate(task.remodelled(_following("left").rigid()), "++", warning=False)
+    assert float(pf.tracking_dataset([run])["tracking_max"].item()) < 1e-5
+
+
+def test_a_motor_that_follows_is_a_table_of_the_file(tmp_path):
+    pf.load("five_bar").mechanism.save(tmp_path / "plain.toml")
+    assert '[motor]\nleft = "A1"' in (tmp_path / "plain.toml").read_text(encoding="utf-8")
+    changed = _following("left")
+    changed.save(tmp_path / "one.toml")
+    assert pf.load(tmp_path / "one.toml").mechanism.motors == changed.motors
+    for wrong, message in (
+        ('"path"', "motor.left.follows: should be 'plan' (got 'path')"),
+        ("1", "motor.left.follows"),
+    ):
+        path = tmp_path / "wrong.toml"
+        path.write_text((tmp_path / "one.toml").read_text(encoding="utf-8").replace('"plan"', wrong), encoding="utf-8")
+        with pytest.raises(InputError, match=re.escape(message)):
+            pf.load(path)
+
+
+@pytest.mark.parametrize(
+    ("act", "message"),
+    [
+        (
+            lambda one: pf.simulate(one, "++", after="hold", warning=False),
+            "study.after: motors that give torques cannot",
+        ),
+        (lambda one: simulate_mujoco(one, "++"), "motor.left.follows: MuJoCo needs given torques"),
+        (lambda one: pf.simulate_motion(one.mechanism, 0.1, start="outward"), "a motion without a path needs given"),
+        (lambda one: Environment(one), "a sampled controller needs given torques"),
+    ],
+)
+def test_motors_that_follow_are_refused_by_name(task, act, message):
+    with pytest.raises(InputError, match=re.escape(message)):
+        act(task.remodelled(_following("left")))
+
+
 def test_modes_are_named_by_a_word():
     mechanism = pf.load("five_bar").mechanism
     mode = parse_mode(mechanism, "left,right servo")
@@ -89,5 +153,5 @@ def test_runs_show_both_side_by_side(tmp_path):
     done = paraflex("run", "five_bar", "--servo", "--duration", "0.5", "--out", tmp_path, "--no-figures")
     assert done.returncode == 0, done.stderr
     assert list(pf.load_results(tmp_path)["mode"].values) == ["++", "++ servo"]
-    assert "the motors free, of servo modes held on the plan" in done.stdout
+    assert "the motors free, those that follow the plan held on it" in done.stdout
     assert "--mode '++ servo'" in (tmp_path / "report.html").read_text(encoding="utf-8").replace("&#x27;", "'")

@@ -29,6 +29,7 @@ from .findings import Finding, warn_of
 from .integrators import IntegrationOptions, Method, Solution, check_times, choose, integrate
 from .kernel.packed import Signals
 from .mechanism import Mechanism, Start, TimeProfile
+from .mechanism.actuation_modes import check_torques, mode_of_motors
 from .mechanism.loads import InTime, value_in_time
 from .mechanism.quantities import known
 from .paths import ModelWithPaths
@@ -172,6 +173,7 @@ def simulate_motion(
         if not isinstance(torque, TimeProfile) and not np.isfinite(torque):
             raise InputError("not a finite number", field=f"torques.{name}", value=torque, remedy="give it in N m")
     values = {name: torques.get(name, 0.0) for name in names}
+    check_torques(mode_of_motors(mechanism, names), "a motion without a path", mechanism.motors)
     system, state, times = motion_start(given, duration, samples, start, balanced=balanced, warning=warning)
     signals, knots = _signals(system, values, float(times[-1]))
     try:

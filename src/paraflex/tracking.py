@@ -42,6 +42,7 @@ from .integrators import IntegrationOptions, Method, Solution, check_times, choo
 from .integrators.beam_ends import leave_beam
 from .integrators.between import SAMPLES
 from .mechanism import ActuationMode, Mechanism, Motor, finite_segments, parse_mode, standing
+from .mechanism.actuation_modes import followers
 from .mechanism.profiles import stops
 from .paths import ModelWithPaths, Path, RigidMotion, path_follower
 from .validity import Driven, Following, Validity, assess, implausible_results, warn, with_likely_cause
@@ -442,7 +443,7 @@ def simulate(
 
     march = partial(integrate, options=options, samples=task.motion.t.size, on_progress=on_progress)
     try:
-        if torques.mode.follows:
+        if followers(task.mechanism.motors, torques.mode):
             run = _follow(task, torques, run_of, march)
         elif task.holds:
             run = _drive_and_hold(task, torques, run_of, march)
@@ -470,16 +471,22 @@ def _drive(task: TrackingTask, torques: FeedForward, times: Array, march: Callab
 def _follow(
     task: TrackingTask, torques: FeedForward, run_of: Callable[..., TrackingRun], march: Callable[..., Solution]
 ) -> TrackingRun:
-    """Move along the path with the joints of the active motors held on the planned motion."""
-    motors = [motor for motor in task.mechanism.motors if motor.name in torques.mode.motors]
+    """Move along the path with the joints of motors held on the planned motion; other active ones give torques."""
+    motors = followers(task.mechanism.motors, torques.mode)
+    if task.holds and len(motors) < len(torques.mode.motors):
+        raise InputError(
+            "motors that give torques cannot be locked where others follow the plan", field="study.after",
+            value=task.after.value, remedy='write after = "free"',
+        )  # fmt: skip
     profiles = planned_profiles(task.plan, torques, [motor.joint for motor in motors])
     held = held_joints(task.system, task.start, profiles)
-    signals, knots = still_signals(held.system.mechanism, float(task.motion.t[-1]))
+    end, follow = float(task.motion.t[-1]), [motor in motors for motor in task.mechanism.motors]
+    signals, knots = pack_signals(held.system.mechanism, torques.without(follow).signals, end)
     stops = np.unique(np.concatenate([path_stops(torques.knots, task.mechanism), knots]))
     own = [held.system.rows.index(row) for row in task.system.rows]
 
     def whole(solution: Solution) -> TrackingRun:
-        holding = _holding(task, motors, held, solution)
+        holding = _holding(task, motors, held, solution) + torques.without(follow).evaluate(solution.t)
         errors = solution.multiplier_errors
         solution = replace(
             solution,

@@ -1,13 +1,13 @@
 """Torques as smooth functions of time: splines between the path's knots, exact to the tolerance."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import pairwise
 
 import numpy as np
 
 from paraflex.arrays import Array, Brief
-from paraflex.dynamics import InputSignals
+from paraflex.dynamics import InputSignals, constant_signals
 from paraflex.errors import Moment, NumericalError
 from paraflex.mechanism import ActuationMode
 from paraflex.paths import RigidMotion
@@ -55,6 +55,13 @@ class FeedForward(Brief):
             x = t - signal.breaks[piece]
             columns.append(sum(signal.coefficients[piece, power] * x**power for power in range(DEGREE + 1)))
         return np.column_stack(columns)
+
+    def without(self, following: Sequence[bool]) -> "FeedForward":
+        """Return the torques of the motors that do not follow the plan, as if those that do were passive."""
+        zero = constant_signals([0.0], float(self.knots[-1]))[0]
+        return replace(
+            self, signals=tuple(zero if off else one for off, one in zip(following, self.signals, strict=True))
+        )
 
     def shaped(self, delays: Array, weights: Array) -> "FeedForward":
         """Return the weighted sum of delayed copies of these torques; before the first instant its torque holds.

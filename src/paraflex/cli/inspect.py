@@ -200,6 +200,7 @@ def _counts(model: Model, system: System, rigid: System) -> dict[str, Any]:
         "bodies": len(mechanism.bodies),
         "joints": len(mechanism.joints),
         "motors": [motor.name for motor in mechanism.motors],
+        "following": [motor.name for motor in mechanism.motors if motor.follows],
         "actuators": [_actuator(mechanism, one) for one in mechanism.actuators],
         "prescribed": [_drive(one, "m/s" if mechanism.slides(one.joint) else "rad/s") for one in mechanism.prescribed],
         "loads": [_load(one) for one in mechanism.loads],

@@ -77,6 +77,7 @@ def _counts(facts: dict[str, Any]) -> Table:
         ("joints", "joints"),
         ("independent loops", "loop_count"),
         ("motors", "motors"),
+        ("  following the plan", "following"),
         ("actuators", "actuators"),
         ("prescribed motions", "prescribed"),
         ("loads", "loads"),
@@ -96,7 +97,9 @@ def _counts(facts: dict[str, Any]) -> Table:
         ("paths", "paths"),
     ):
         # Empty rows of gears and the like are left out, as most mechanisms have none.
-        if key in facts and (facts[key] or key not in (*related, "actuators", "prescribed", "loads", "controllers")):
+        if key in facts and (
+            facts[key] or key not in (*related, "following", "actuators", "prescribed", "loads", "controllers")
+        ):
             value = facts[key] if key != "total_mass" else output_unit("kg").factor * facts[key]
             if key == "total_mass" and facts["payload"]:
                 table.add_row(label, f"{value:g}, including its payload")

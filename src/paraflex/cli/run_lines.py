@@ -59,8 +59,8 @@ def print_runs(
     print_table(out, table, f"{task.mechanism.name}, {model}: {table.title}")
     ked = first["parameters"]["run"].get("ked")
     motors = "held all the time" if ked else "held by brakes" if task.holds else "free"
-    if any(name[-1].endswith(f" {SERVO}") for name in runs):
-        motors += ", of servo modes held on the plan"
+    if any(name[-1].endswith(f" {SERVO}") for name in runs) or any(each.follows for each in task.mechanism.motors):
+        motors += ", those that follow the plan held on it"
     print_table(out, after_table(rows), f"Tracking error during the motion and after it, the motors {motors}")
     print_table(out, controller_table(runs, heads))
     for (*path, mode), one in runs.items():

@@ -108,7 +108,7 @@ def simulate_exudyn(task: TrackingTask, mode: str | ActuationMode, options: Exud
     check_engine("exudyn", task.mechanism)
     check_dwell("exudyn", task)
     torques = task.torques(mode)
-    check_torques(torques.mode, "Exudyn")
+    check_torques(torques.mode, "Exudyn", task.mechanism.motors)
     substeps = steps_between(task.motion.t, options.step)
     begin = time.perf_counter()
     engine = _start_engine()

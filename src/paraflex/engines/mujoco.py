@@ -87,7 +87,7 @@ def simulate_mujoco(task: TrackingTask, mode: str | ActuationMode, options: MuJo
     began = time.perf_counter()
     task = task if task.whole is not None else task.in_segments(proportional_segments(task.mechanism, options.segments))
     torques = task.torques(mode)
-    check_torques(torques.mode, "MuJoCo")
+    check_torques(torques.mode, "MuJoCo", task.mechanism.motors)
     tree = spanning_tree(task.mechanism)
     count = steps_between(task.motion.t, options.step)
     model = _model(mujoco, task.system, tree, float(task.motion.t[1] - task.motion.t[0]) / count)

@@ -237,7 +237,8 @@ def _slides(data: Mapping[str, Any], place: Place) -> bool | None:
     if table == "statics" and owner in ("loads", "moved"):
         return _moves_straight(data, str(key))
     of_motor = table in ("study", "statics") and owner == "torques"
-    return _joint_slides(data, value_at(data, ("motor", key) if of_motor else (table, owner, "joint")))
+    joint = value_at(data, ("motor", key) if of_motor else (table, owner, "joint"))
+    return _joint_slides(data, _below(joint, "joint") if isinstance(joint, dict) else joint)
 
 
 def _ratio_units(data: Mapping[str, Any], place: Place) -> tuple[str, ...]:

@@ -180,7 +180,9 @@ def read_mechanism(table: ModelTable) -> Mechanism:
         **members,
         bodies=tuple(read_body(name, body, table) for name, body in table.body.items()),
         joints=tuple(_joint(name, entry) for name, entry in table.joint.items()),
-        motors=tuple(Motor(name, joint) for name, joint in table.motor.items()),
+        motors=tuple(
+            Motor(name, one) if isinstance(one, str) else Motor(name, **dict(one)) for name, one in table.motor.items()
+        ),
         prescribed=_prescribed(table),
         end_effector=None if effector is None else EndEffector(**dict(effector)),
         assemblies=tuple(Assembly(name, one.angles, cast(Any, one.points)) for name, one in table.assembly.items()),

@@ -47,6 +47,7 @@ from paraflex.mechanism import (
     Mechanism,
     ModalBody,
     ModalPoint,
+    Motor,
     Payload,
     PointRef,
     RigidBody,
@@ -415,6 +416,17 @@ JointEntry = Annotated[
 ]
 
 
+class MotorTable(_table_of(Motor)):
+    """A motor with fields of its own."""
+
+
+# A motor may be written as the name of its joint alone.
+MotorEntry = Annotated[
+    Annotated[Text, Tag("joint")] | Annotated[MotorTable, Tag("MotorTable")],
+    Discriminator(lambda value: "MotorTable" if isinstance(value, dict) else "joint"),
+]
+
+
 class PieceTable(_Table):
     """One piece of a profile."""
 
@@ -649,7 +661,7 @@ class _Parts(_Table):
     joint: dict[str, JointEntry] = _optional(
         '["body.point", "body.point"] for each revolute joint, a table for others', {}
     )
-    motor: dict[str, Text] = _optional("the joint of each motor", {})
+    motor: dict[str, MotorEntry] = _optional("the joint of each motor, or a table", {})
     prescribed: dict[str, PrescribedTable] = {}
 
 

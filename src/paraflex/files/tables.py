@@ -92,7 +92,7 @@ def model_tables(
             joint.name: [joint.a, joint.b] if joint.kind == "revolute" else {"type": joint.kind, **_member(joint)}
             for joint in mechanism.joints
         },
-        "motor": {motor.name: motor.joint for motor in mechanism.motors},
+        "motor": {motor.name: _member(motor) if motor.follows else motor.joint for motor in mechanism.motors},
         "prescribed": {each.name: _prescribed(each, mechanism) for each in mechanism.prescribed},
         # Springs, dampers, friction and loads.
         **{

@@ -5,6 +5,7 @@ from dataclasses import replace
 
 from paraflex.arguments import checked_arguments
 from paraflex.errors import InputError
+from .joints import Motor
 from .mechanism import Mechanism
 from .members import ActuationMode
 from .quantities import known
@@ -78,16 +79,27 @@ def following(mode: ActuationMode) -> ActuationMode:
     return mode if mode.follows else replace(mode, name=f"{mode.name} {SERVO}", follows=True)
 
 
-def check_torques(mode: ActuationMode, what: str) -> None:
-    """Check that the motors of a mode give torques, for what cannot hold them on the planned motion.
+def followers(motors: Sequence[Motor], mode: ActuationMode) -> list[Motor]:
+    """Return the active ones of motors that hold their joints on the planned motion."""
+    return [motor for motor in motors if motor.name in mode.motors and (mode.follows or motor.follows)]
+
+
+def check_torques(mode: ActuationMode, what: str, motors: Sequence[Motor] = ()) -> None:
+    """Check that a mode and these motors give torques, for what cannot hold them on the planned motion.
 
     Raises
     ------
     InputError
-        The motors follow the planned motion.
+        A motor follows the planned motion.
     """
-    if mode.follows:
+    following = followers(motors, mode)
+    if mode.follows or following:
+        field, value, remedy = (
+            ("mode", mode.name, f'leave out "{SERVO}"')
+            if mode.follows
+            else (f"motor.{following[0].name}.follows", "plan", "leave it out")
+        )
         raise InputError(
-            f"{what} needs given torques, and the motors of this mode follow the planned motion", field="mode",
-            value=mode.name, remedy=f'leave out "{SERVO}"',
+            f"{what} needs given torques, and a motor of this mode follows the planned motion", field=field,
+            value=value, remedy=remedy,
         )  # fmt: skip

@@ -8,7 +8,7 @@ such that the coordinate increases.
 
 from dataclasses import dataclass, field, fields
 from enum import Enum
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Literal
 
 from paraflex.arguments import CheckedFields, checked_arguments, named_in_errors
 from paraflex.errors import InputError, within
@@ -284,9 +284,20 @@ class Motor(CheckedFields):
     """Motor at a joint that turns or slides; a positive torque or force moves body b relative to body a.
 
     The torque acts on the material at the joint: on the body's angle and on the slope of the beam there.
+
+    Attributes
+    ----------
+    name : str
+        Name of the motor.
+    joint : str
+        Joint that it moves.
+    follows : "plan", optional
+        Makes the motor hold its joint on the planned motion where it is active, as an ideal servo drive does, instead
+        of giving its planned torque.
     """
 
     _table = "motor"
 
     name: str
     joint: str = field(metadata=AT_JOINT)
+    follows: Literal["plan"] | None = optional(None, '"plan" for a motor that holds its joint on the planned motion')

@@ -97,7 +97,7 @@ class PlannedDeflections:
         ActuationError, SingularActuationError
             The mode cannot drive the mechanism along the path.
         """
-        check_torques(mode, "the choice of few coordinates")
+        check_torques(mode, "the choice of few coordinates", self.task.mechanism.motors)
         system, times, (q, v, a) = self.task.system, self.task.motion.t, self._motion
         torques, forces = self.task.torques(mode).evaluate(times), np.zeros_like(q)
         loads = acting_loads(system.mechanism, times)

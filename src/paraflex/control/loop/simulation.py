@@ -512,7 +512,7 @@ def _projecting(options: IntegrationOptions) -> IntegrationOptions:
 
 def _mode(mechanism: Mechanism, mode: str | ActuationMode | None) -> ActuationMode:
     if mode is None:
-        return mode_of_motors(mechanism, [motor.name for motor in mechanism.motors])
+        mode = mode_of_motors(mechanism, [motor.name for motor in mechanism.motors])
     mode = mode if isinstance(mode, ActuationMode) else parse_mode(mechanism, mode)
-    check_torques(mode, "a sampled controller")
+    check_torques(mode, "a sampled controller", mechanism.motors)
     return mode

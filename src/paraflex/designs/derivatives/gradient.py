@@ -95,7 +95,7 @@ def mode_gradients(setting: Setting, task: Task, sizes: Sequence[float | None] |
             remedy='write after = "free", or a duration that ends with the path',
         )  # fmt: skip
     for mode in setting.modes:
-        check_torques(planned.mode(mode), "a derivative")
+        check_torques(planned.mode(mode), "a derivative", planned.mechanism.motors)
     sizes = [None] * len(setting.names) if sizes is None else sizes
     sizes = [size_of(setting, task, k, size) for k, size in enumerate(sizes)]
     changes = [Change(setting, task, planned, k, size) for k, size in enumerate(sizes)]
