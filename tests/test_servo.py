@@ -106,6 +106,14 @@ def test_a_motor_that_follows_is_a_table_of_the_file(tmp_path):
             pf.load(path)
 
 
+def test_a_motor_written_as_its_joint_alone_takes_the_field():
+    model = pf.load("five_bar", set={"motor.left.follows": "plan"})
+    assert model.mechanism.motors == _following("left").motors
+    for field in ("body.proximal1.section.thickness", "name.x"):
+        with pytest.raises(InputError, match=f"{re.escape(field)}: no such field in the model's file"):
+            pf.load("five_bar", set={field: "1 mm"})
+
+
 @pytest.mark.parametrize(
     ("act", "message"),
     [

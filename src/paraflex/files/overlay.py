@@ -87,7 +87,9 @@ def _place_to_set(data: Mapping[str, Any], field: str) -> Place:
     parts = _in_full(data, field)
     place = _followed(data, parts)
     for part in parts[len(place) :]:
-        if isinstance(value_at(data, place), list) or not _may_have(data, place, part):
+        inside = value_at(data, place)
+        short = isinstance(inside, str) and place[:1] == ("motor",)
+        if not (inside is None or isinstance(inside, dict) or short) or not _may_have(data, place, part):
             raise InputError(
                 "no such field in the model's file", field=field,
                 remedy=_same_names(data, part) or suggestion(_spelt((*place, part)), _known_below(data, place)),
@@ -186,7 +188,9 @@ def overlaid(data: dict[str, Any], values: Sequence[tuple[Place, Any]]) -> dict[
         inside: Any = out
         for key in place[:-1]:
             below = inside.get(key, {}) if isinstance(inside, dict) else inside[key]
-            inside[key] = dict(below) if isinstance(below, dict) else list(below)
+            # A motor may be written as the name of its joint alone.
+            table = {"joint": below} if isinstance(below, str) else below
+            inside[key] = dict(table) if isinstance(table, dict) else list(table)
             inside = inside[key]
         inside[place[-1]] = value
     return out
