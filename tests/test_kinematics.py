@@ -11,6 +11,8 @@ import pytest
 
 import paraflex as pf
 from paraflex.errors import InputError, UnreachablePathError
+from paraflex.figures.run_motion import point_paths
+from paraflex.figures.selection import as_runs
 from shell import paraflex
 
 REFERENCE = {
@@ -644,6 +646,13 @@ def test_the_commands_write_results_that_other_commands_take(rocker, tmp_path):
     page = (folder / "report.html").read_text(encoding="utf-8")
     assert "Transmission angles" in page
     assert "paraflex kinematics" in page
+    # The page tells the range, the smallest transmission angle and the time ratio, over the angle of the drive.
+    assert "smallest transmission angle" in page
+    assert "Motors and prescribed motions" not in page
+    data = json.loads(re.search(r'<script type="application/json" id="report-data">(.*?)</script>', page, re.DOTALL)[1])
+    assert data["abscissae"][data["over"] - 1]["name"] == "angle of O"
+    assert not data["film"]["bends"]
+    assert {each.stem for each in (folder / "figures").iterdir()} == {"motion_overview", "point_paths"}
     summary = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
     assert summary["kinematics"]["time_ratios"]["Q"] == pytest.approx(1.0374965917973495)
     # Without masses no force has a value, and none is zero.
@@ -652,6 +661,16 @@ def test_the_commands_write_results_that_other_commands_take(rocker, tmp_path):
     assert paraflex("plot", folder, "--out", tmp_path / "figures").returncode == 0
     done = paraflex("torques", "four_bar", "--speed", "100 rpm", "--drive", "O", "--fluctuation", "0.02")
     assert "flywheel for a fluctuation of 0.02: 0.0754 kg m^2" in done.stdout
+
+
+def test_paths_of_points_mark_cusps_and_crunodes(rocker):
+    motion = pf.kinematics(pf.load(rocker), "O")
+    chart = next(iter(point_paths(as_runs(pf.motion_dataset(motion)))))
+    (mark,) = [curve for curve in chart.curves if curve.name in ("cusp", "crunode")]
+    (node,) = motion.features.trails["coupler.P"].crunodes
+    assert np.array_equal([mark.x, mark.y], np.array(node.position)[:, None])
+    only = next(iter(point_paths(as_runs(pf.motion_dataset(motion)), points=["crank.A"])))
+    assert "crunode" not in {curve.name for curve in only.curves}
 
 
 @pytest.mark.parametrize(

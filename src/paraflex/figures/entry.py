@@ -46,7 +46,7 @@ class Figure:
     written_as : str
         Stem of the file that the command which makes the results writes; empty if that command does not write it.
     written_with : tuple of str
-        Variables without which the command does not write the figure.
+        Variables and attributes without which the command does not write the figure.
     variables : tuple of str
         Variables of the dataset that the figure requires.
     points : str
@@ -106,7 +106,8 @@ class Figure:
 
     def is_written(self, data: Any) -> bool:
         """Check whether the command that makes the results writes the figure."""
-        return bool(self.written_as) and all(name in data for name in self.written_with)
+        there = {*data, *data.variables, *data.attrs} if isinstance(data, xr.Dataset) else data
+        return bool(self.written_as) and all(name in there for name in self.written_with)
 
     def describe(self, data: Any, **options: Any) -> list[Chart]:
         """Return the charts of results from `prepared`; charts without any value are left out."""

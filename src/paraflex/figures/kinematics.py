@@ -1,12 +1,14 @@
 """Tables of driven motions: ranges, dead points and time ratios of joints, transmission angles, coupler curves."""
 
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Container, Iterator, Mapping
 from typing import Any
 
 import numpy as np
 import xarray as xr
 
+from paraflex.arrays import Array
+from paraflex.formatting import display_unit, number, quantity, text_symbol
 from paraflex.results.kinematics import KINEMATICS
 from .selection import names_of
 from .tables import Column, Table
@@ -23,6 +25,13 @@ def kinematics_of(data: xr.Dataset) -> dict[str, Any]:
     return json.loads(data.attrs.get(KINEMATICS, "{}"))
 
 
+def special_points(data: xr.Dataset, kind: str, points: Container[str]) -> Array:
+    """Return the positions (k, 2) of the cusps or crunodes of points' paths; none for runs without a drive [m]."""
+    trails = kinematics_of(data).get("trails", {})
+    found = [each["position"] for point in trails if point in points for each in trails[point][f"{kind}s"]]
+    return np.array(found).reshape(-1, 2)
+
+
 def kinematics_tables(data: xr.Dataset) -> Iterator[Table]:
     """Yield the tables of a driven motion; none for other runs."""
     found = kinematics_of(data)
@@ -34,6 +43,28 @@ def kinematics_tables(data: xr.Dataset) -> Iterator[Table]:
         yield _points(data)
         yield _special(found)
         yield _assemblies(found)
+
+
+def kinematics_tiles(data: xr.Dataset) -> list[tuple[str, str, str]]:
+    """Return the main numbers of a driven motion: range of the drive, smallest transmission angle, time ratio."""
+    found, tiles = kinematics_of(data), []
+    key, where, unit = _place(found)
+    if drive := found["drive"]:
+        shown = display_unit(unit, max(abs(drive["start"]), abs(drive["end"])))
+        ends = [number(drive[end], factor=shown.factor) for end in ("start", "end")]
+        turn = "a whole turn, " if drive["full_turn"] else ""
+        tiles.append(
+            (f"{where} moves", f"{' to '.join(ends)} {shown.name}", f"{turn}at {quantity(drive['speed'], unit + '/s')}")
+        )
+    if angles := found["transmission_angles"]:
+        least = min(angles, key=lambda one: one["smallest"]["value"])
+        at = quantity(least["smallest"][key], unit, padded=False)
+        tiles.append(("smallest transmission angle", quantity(least["smallest"]["value"], "rad"),
+                      f"joint {text_symbol(least['joint'])} at {where} = {at}"))  # fmt: skip
+    if ratios := found["time_ratios"]:
+        joint = max(ratios, key=lambda name: ratios[name])
+        tiles.append(("largest time ratio", number(ratios[joint]), f"joint {text_symbol(joint)}"))
+    return tiles
 
 
 def _place(found: Found) -> tuple[str, str, str]:

@@ -8,9 +8,11 @@ import xarray as xr
 
 from paraflex.arrays import Array
 from paraflex.formatting import peak, text_symbol
+from paraflex.results.kinematics import KINEMATICS
 from paraflex.units import EFFORTS
 from .charts import DOTTED, Axis, Chart, Curve, Look, look
 from .entry import figure
+from .kinematics import special_points
 from .runs import compared, followed, of_names, ranges, run_names, stopped_runs
 from .selection import names_of, place_of, point_number
 
@@ -262,9 +264,10 @@ def point_components(data: xr.Dataset, points: Sequence[str] = ()) -> Iterator[C
 
 
 @figure("paths of named points in the plane", heading=_POINTS, takes="mode", points="points",
-        variables=("point_position",), defaults=lambda data: {"points": _few_points(data)})  # fmt: skip
+        variables=("point_position",), written_as="point_paths", written_with=(KINEMATICS,), height=90.0,
+        defaults=lambda data: {"points": _few_points(data)})  # fmt: skip
 def point_paths(data: xr.Dataset, points: Sequence[str] = ()) -> Iterator[Chart]:
-    """Yield the chart of the paths of named points in the plane, their trails.
+    """Yield the chart of the paths of named points in the plane, their trails, with cusps and crunodes.
 
     Parameters
     ----------
@@ -273,7 +276,12 @@ def point_paths(data: xr.Dataset, points: Sequence[str] = ()) -> Iterator[Chart]
         the points that travel most, up to seven.
     """
     chart = Chart("points", "Paths of points", Axis("", "m", "y"), x=Axis("", "m", "x"), equal=True)
-    yield _in_the_plane(chart, data, "point_position", points)
+    chart = _in_the_plane(chart, data, "point_position", points)
+    drawn = {curve.name for curve in chart.curves}
+    places = {kind: special_points(data, kind, drawn).T for kind in ("cusp", "crunode")}
+    marks = [Curve(kind, y, x, mark="triangle" if kind == "cusp" else "diamond")
+             for kind, (x, y) in places.items() if x.size]  # fmt: skip
+    yield replace(chart, curves=[*chart.curves, *marks])
 
 
 @figure("hodographs: velocity of named points in y over that in x", heading=_POINTS, takes="mode", points="points",

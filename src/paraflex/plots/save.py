@@ -11,6 +11,8 @@ import xarray as xr
 from paraflex.arguments import checked_arguments
 from paraflex.campaign.workers import share_out
 from paraflex.errors import InputError
+from paraflex.figures.charts import TIME
+from paraflex.figures.kinematics import kinematics_of
 from paraflex.folders import added_to
 from paraflex.mechanism.quantities import all_known
 from paraflex.results.kinds import kind_of
@@ -73,10 +75,14 @@ def _accompanying(
     if not kind:
         raise InputError("not the numbers of a result", field="results", remedy="give what its to_dict() returns")
     source = Source(kind, results, folder)
+    drive = kinematics_of(results).get("drive") if isinstance(results, xr.Dataset) else None
     drawn = []
     for figure in figures_of(source, written=True):
         named, one_of_many = replace(figure, name=figure.written_as), figure.takes in ("models", "run")
-        for drawing in drawings(source, figure, [mode] if mode is not None and figure.takes == "mode" else ()):
+        modes = [mode] if mode is not None and figure.takes == "mode" else ()
+        # A mechanism with a drive is shown over its angle or travel, as designers know it.
+        over = drive["joint"] if drive is not None and figure.is_over_time(results) else TIME.name
+        for drawing in drawings(source, figure, modes, over=over):
             drawn.append(replace(drawing, figure=named, of=drawing.of if one_of_many else ""))
     return drawn
 

@@ -11,6 +11,7 @@ import xarray as xr
 from paraflex.arrays import Array, Brief, NDArray
 from paraflex.errors import InputError
 from paraflex.figures.shapes import figure_of
+from paraflex.formatting import ROUNDING, peak
 from paraflex.plots.marks import DOT, LOOKS, Mark, key_arrow, moving_marks, still_marks
 from paraflex.plots.scene import JOINT_BASES, Limits, Scene, common_limits, default_magnification, is_plate, scene
 from .packing import packed
@@ -76,6 +77,7 @@ class Animation(Brief):
                 for (name, first, _), figure in zip(self.bodies, figures, strict=True)
             ],
             "looks": LOOKS,
+            "bends": peak(self.shape - self.base) > ROUNDING * limits.size or any(self.stiff),
             "magnify": self.magnify,
             "periodic": self.periodic,
             "moments": list(self.moments),

@@ -9,7 +9,7 @@ import numpy as np
 import xarray as xr
 
 from paraflex.arguments import checked_arguments
-from paraflex.figures.kinematics import kinematics_of, kinematics_tables
+from paraflex.figures.kinematics import kinematics_of, kinematics_tables, kinematics_tiles
 from paraflex.figures.reduction import reduced_runs
 from paraflex.figures.run_motion import deflections_of
 from paraflex.figures.selection import as_runs, names_of, samples
@@ -32,17 +32,22 @@ def motion_page(data: xr.Dataset) -> Page:
     check_kind(data, "motion")
     data = data.transpose("time", ...)
     page, status, loads = kind_page(data), str(data["status"].item()), loads_of_runs(data)
+    found = kinematics_of(data)
+    # Without masses there are no forces.
+    forceless = found and loads[""]["frame"]["force_max"] is None
+    drive = found["drive"]["joint"] if found.get("drive") else ""
     return replace(
         page,
-        kind="run",
+        over=drive if any(one.name == drive for one in page.abscissae) else "",
+        kind="kinematics" if found else "run",
         subtitle=_subtitle(data),
         facts=common_facts(data),
         figures=_figures(data, loads),
         more=[
             *sections(kinematics_tables(data)),
-            *load_tables(data, loads),
+            *([] if forceless else load_tables(data, loads)),
             *sections(reduced_runs(data)),
-            ("Integration", _table(data)),
+            ("Closure of loops" if found else "Integration", _table(data, brief=bool(found))),
         ],
         runs=("",),
         film=animation(data, ()),
@@ -65,8 +70,11 @@ def _subtitle(data: xr.Dataset) -> str:
     return "; ".join(parts) or "left to its loads"
 
 
-def _table(data: xr.Dataset) -> str:
+def _table(data: xr.Dataset, *, brief: bool) -> str:
+    """Return status, work and accuracy of a run; those of a driven motion are the gaps of its loops, if `brief`."""
     facts = [("status", str(data["status"].item())), *table_pairs(solver_table(Runs({"": as_runs(data)})))]
+    if brief:
+        return pairs([("positions", str(samples(data))), *(one for one in facts if "violation" in one[0])])
     facts += [(f"torque of {text_symbol(str(name))}", _torque(data["applied_torque"].sel(motor=name)))
               for name in data["motor"].values]  # fmt: skip
     passed = json.loads(data.attrs.get("singular_positions", "[]"))
@@ -83,6 +91,8 @@ def _torque(values: xr.DataArray) -> str:
 
 
 def _figures(data: xr.Dataset, loads: Mapping[str, Mapping[str, Any]]) -> list[tuple[str, str, str]]:
+    if kinematics_of(data):
+        return [*kinematics_tiles(data), *load_tiles(loads)]
     tiles = load_tiles(loads)
     if body := most_bent(data):
         tiles.append(("largest deflection", quantity(peak(deflections_of(data)), "m"), text_symbol(body)))

@@ -2,18 +2,19 @@
 
 import json
 from dataclasses import asdict
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import xarray as xr
 
-from paraflex.driven import DrivenMotion, Flywheel
+if TYPE_CHECKING:
+    from paraflex.driven import DrivenMotion, Flywheel
 
 # Attribute of a dataset with the properties of a driven motion, as JSON.
 KINEMATICS = "kinematics"
 
 
 def add_kinematics(
-    data: xr.Dataset, motion: DrivenMotion, *, assemblies: bool = False, flywheel: Flywheel | None = None
+    data: xr.Dataset, motion: "DrivenMotion", *, assemblies: bool = False, flywheel: "Flywheel | None" = None
 ) -> None:
     """Store the properties of a driven motion in its dataset, as JSON in the attribute "kinematics".
 

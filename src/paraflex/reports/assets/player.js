@@ -52,7 +52,7 @@ const player = (() => {
 
   function magnify(by) {
     const next = by > 0 ? MAGNIFICATIONS.find((m) => m > state.magnify * 1.001) : MAGNIFICATIONS.findLast((m) => m < state.magnify * 0.999);
-    if (next) report.set("magnify", next);
+    if (next && film && film.bends) report.set("magnify", next);
   }
 
   // The screen: metres to pixels, the same scale both ways, y upwards.
@@ -243,7 +243,7 @@ const player = (() => {
   function drawCaption(stopped) {
     pen.font = `13px ${getComputedStyle(document.body).fontFamily}`; pen.textBaseline = "top"; pen.fillStyle = colours.soft;
     const run = page.runs.length > 1 || report.runName() ? `${report.runName()}   ` : "";
-    const by = film.periodic ? `   displacements × ${state.magnify}` : state.magnify !== 1 ? `   deflections × ${state.magnify}` : width > 420 ? "   true deflections" : "";
+    const by = film.periodic ? `   displacements × ${state.magnify}` : state.magnify !== 1 ? `   deflections × ${state.magnify}` : film.bends && width > 420 ? "   true deflections" : "";
     const caption = `${named ? "" : film.periodic ? "phase " : "t = "}${secondsText(state.time)}${by}`;
     // On a narrow screen the buttons alone name the run.
     pen.fillText(pen.measureText(run + caption).width < width - 24 ? run + caption : caption, 12, 8);
@@ -367,6 +367,8 @@ const player = (() => {
       }
       return;
     }
+    // Rigid links have no deflections to magnify.
+    if (!film.bends) for (const name of ["has-magnify", "has-ghost", "key-magnify"]) byId(name).hidden = true;
     byId("has-trail").hidden = film.tips.every((tip) => tip === null);
     const names = ["base", "bend", "path"];
     const read = await Promise.all(names.map((name) => (film[name] ? report.unpacked(film[name]) : null)));

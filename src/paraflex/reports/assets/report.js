@@ -5,7 +5,7 @@ const report = (() => {
   const root = document.documentElement;
   const dark = matchMedia("(prefers-color-scheme: dark)");
   const listeners = { run: [], time: [], over: [], theme: [], magnify: [], playing: [] };
-  const state = { run: page.selected, time: 0, over: 0, magnify: page.film ? page.film.magnify : 1, playing: false };
+  const state = { run: page.selected, time: 0, over: page.over, magnify: page.film ? page.film.magnify : 1, playing: false };
   let rows = [];
 
   async function inflated(text) {

@@ -73,6 +73,7 @@ const begin = (() => {
     const select = byId("over");
     byId("has-over").hidden = !page.abscissae.length;
     ["time", ...page.abscissae.map((one) => one.name)].forEach((name, k) => select.append(new Option(name, k)));
+    select.value = report.state.over;
     select.addEventListener("change", () => report.set("over", Number(select.value)));
   }
 
