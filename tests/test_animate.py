@@ -30,6 +30,7 @@ from paraflex.plots.scene import ARROW, scale_bar, scene, select
 from paraflex.reports.film import animation
 from paraflex.results import motion_dataset
 from processes import run, started
+from test_kinematics import ROCKER
 
 OLD = Path(__file__).parent / "data" / "schema1.nc"
 SMALL = FilmOptions(magnify=50.0, fps=10.0, speed=0.1, size=(320, 240))
@@ -72,7 +73,7 @@ def test_a_scene_is_the_data_magnified_and_between_samples_the_line_between(data
     # Stations of two bodies at a joint stay together.
     joint = next(joint for joint in shown.joints if joint.name == "B1")
     np.testing.assert_allclose(shown.bodies["link1"][:, -1], joint.place, rtol=0, atol=1e-5)
-    np.testing.assert_allclose(shown.trail[0], run["end_effector"].values[3], rtol=0, atol=1e-5)
+    np.testing.assert_allclose(shown.trails[0][0], run["end_effector"].values[3], rtol=0, atol=1e-5)
     left, right, bottom, top = shown.limits
     assert left < drawn[..., 0].min()
     assert right > drawn[..., 0].max()
@@ -83,14 +84,35 @@ def test_a_scene_is_the_data_magnified_and_between_samples_the_line_between(data
 def test_the_trail_is_that_of_the_point_asked_for(data):
     run = select(data, "++++")
     t = run["time"].values
-    shown = scene(run, t, 1.0, "link1.B1")
-    np.testing.assert_allclose(shown.trail, run["point_position"].sel(point="link1.B1"), rtol=0, atol=1e-5)
+    shown = scene(run, t, 1.0, ["link1.B1"])
+    np.testing.assert_allclose(shown.trails[0], run["point_position"].sel(point="link1.B1"), rtol=0, atol=1e-5)
     film = plan_film(data, ["++++"], replace(SMALL, point="link1.B1"))
     assert film.scenes[0].followed == shown.followed
     assert film.caption.endswith(", trail of link1.B1")
     figure = pf.plots.mechanism_drawing(data, "++++", float(t[10]), 1.0, point="link1.B1")
     ends = [line.get_xydata()[-1] for line in figure.axes[0].get_lines() if len(line.get_xydata()) == 11]
-    np.testing.assert_allclose(ends[0], shown.trail[10], rtol=0, atol=1e-6)
+    np.testing.assert_allclose(ends[0], shown.trails[0][10], rtol=0, atol=1e-6)
+
+
+def test_several_trails(data, tmp_path):
+    points = ["link1.B1", "link4.C"]
+    film = plan_film(data, ["++++"], replace(SMALL, point=points))
+    for trail, point in zip(film.scenes[0].trails, points, strict=True):
+        places = select(data, "++++")["point_position"].sel(point=point)
+        np.testing.assert_allclose(trail[[0, -1]], places[[0, -1]], rtol=0, atol=1e-5)
+    assert film.caption.endswith(", trail of link1.B1, link4.C")
+    drawn = tmp_path / "film.svg"
+    animate(data, drawn, ["++++"], replace(SMALL, point=points))
+    assert drawn.read_text(encoding="utf-8").count('stroke-dashoffset="') == 2
+
+
+def test_the_coupler_curves_of_a_driven_motion_are_trails(tmp_path):
+    (tmp_path / "rocker.toml").write_text(ROCKER, encoding="utf-8")
+    data = pf.motion_dataset(pf.kinematics(pf.load(tmp_path / "rocker.toml"), "O"))
+    film = plan_film(data, (), SMALL)
+    (trail,) = film.scenes[0].trails
+    places = data["point_position"].sel(point="coupler.P")
+    np.testing.assert_allclose(trail[[0, -1]], places[[0, -1]], rtol=0, atol=1e-5)
 
 
 def test_true_deflections_have_no_stiff_twin_and_after_the_end_the_last_picture_stays(data):

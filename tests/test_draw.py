@@ -158,8 +158,7 @@ def test_a_model_with_a_path_stands_where_the_path_begins() -> None:
     shown = pose_of(model)
     figure = model_drawing(shown)
     begins = model.path().evaluate(np.zeros(1)).position[0]
-    place = scene(shown.data, np.zeros(1)).trail
-    assert place is not None
+    (place,) = scene(shown.data, np.zeros(1)).trails
     assert np.allclose(place[0], begins, atol=1e-9)
     assert {"path square", "end-effector link4.C", "assembly outward, at the start of path square"} <= {*words(figure)}
 

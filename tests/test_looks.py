@@ -11,7 +11,7 @@ from scipy.interpolate import CubicSpline
 from colours import APART, colour_distance
 from paraflex.figures.selection import moving_directions
 from paraflex.plots.layout import lay_out, panels
-from paraflex.plots.scene import MAGNIFICATIONS, default_magnification, followed_station
+from paraflex.plots.scene import MAGNIFICATIONS, default_magnification, followed_stations
 from paraflex.plots.style import journal_style
 from paraflex.plots.themes import THEMES
 from paraflex.results.outlines import Hold, Outline, stiff_shape
@@ -79,10 +79,10 @@ def test_the_trail_is_that_of_what_goes_farthest_where_nothing_is_free() -> None
         },
         coords={"point": ["link.A", "link.B"], "point_station": ("point", [0, 1])},
     )
-    assert followed_station(run) == 1
-    assert followed_station(run.assign_attrs(end_effector_point="link.A")) == 0
-    assert followed_station(run.isel(joint=[1])) == 0
-    assert followed_station(run.isel(time=[0])) is None
+    assert followed_stations(run) == (1,)
+    assert followed_stations(run.assign_attrs(end_effector_point="link.A")) == (0,)
+    assert followed_stations(run.isel(joint=[1])) == (0,)
+    assert followed_stations(run.isel(time=[0])) == ()
 
 
 def figure_of(*labels: tuple[str, ...]) -> Figure:

@@ -25,6 +25,11 @@ def kinematics_of(data: xr.Dataset) -> dict[str, Any]:
     return json.loads(data.attrs.get(KINEMATICS, "{}"))
 
 
+def coupler_points(attrs: Mapping[Any, Any]) -> list[str]:
+    """Return the points of the first seven coupler curves, from the attributes of a dataset; none without a drive."""
+    return list(json.loads(attrs.get(KINEMATICS, "{}")).get("trails", ()))[:7]
+
+
 def special_points(data: xr.Dataset, kind: str, points: Container[str]) -> Array:
     """Return the positions (k, 2) of the cusps or crunodes of points' paths; none for runs without a drive [m]."""
     trails = kinematics_of(data).get("trails", {})

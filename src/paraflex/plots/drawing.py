@@ -44,7 +44,7 @@ class Sketch:
         if shown.desired is not None:
             self._line(look.desired, 1.1, 1.5, linestyle=(0, (3, 2))).set_data(*shown.desired.T)
         self._colours = {name: look.link(i) for i, name in enumerate(shown.bodies)}
-        self._trail = self._line(look.trail, 1.3, 2.2)
+        self._trails: list[Line2D] = [self._line(look.trail, 1.3, 2.2) for _ in shown.trails]
         self._stiff = self._polygons("none", look.faint, 1.2, 2.4)
         self._plates = self._polygons("none", "none", 0.0, 2.6)
         self.links: LineCollection = LineCollection([], zorder=3.0, capstyle="round", joinstyle="round")
@@ -62,7 +62,7 @@ class Sketch:
     @property
     def artists(self) -> list[Artist]:
         """Artists of the moving parts, from the back to the front."""
-        moving = [self._trail, self._stiff, self._plates, self.links, *self.marks.values(), self._head]
+        moving = [*self._trails, self._stiff, self._plates, self.links, *self.marks.values(), self._head]
         return sorted(moving, key=lambda artist: artist.get_zorder())
 
     def show(self, i: int) -> None:
@@ -83,9 +83,10 @@ class Sketch:
                 artist.set_data(*np.concatenate(places).T)
             else:
                 artist.set_verts(places, closed=False)
-        if self.scene.trail is not None:
-            self._trail.set_data(*self.scene.trail[: i + 1].T)
-            self._head.set_data(*self.scene.trail[i : i + 1].T)
+        for line, trail in zip(self._trails, self.scene.trails, strict=True):
+            line.set_data(*trail[: i + 1].T)
+        if self.scene.trails:
+            self._head.set_data(*np.stack([trail[i] for trail in self.scene.trails]).T)
 
     def _line(self, colour: str, width: float, zorder: float, **look: Any) -> Line2D:
         (line,) = self.axes.plot([], [], color=colour, linewidth=width * self._width, zorder=zorder, **look)

@@ -56,7 +56,7 @@ def _steps(data: xr.Dataset) -> Scene:
     """Return the scene of all steps, without loads and trail."""
     samples = as_samples(data)
     shown = scene(samples, samples["time"].values)
-    return replace(shown, trail=None, followed=None, loads=(), load_keys={})
+    return replace(shown, trails=(), followed=(), loads=(), load_keys={})
 
 
 def _with_shape(pair: xr.Dataset, shape: Array) -> xr.Dataset:

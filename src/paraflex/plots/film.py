@@ -236,8 +236,8 @@ class FilmOptions:
         Time of a single picture [s]; the middle of the run by default.
     model : str, optional
         Model of a verification; the reference model by default.
-    point : str, optional
-        Point "body.point" whose trail is drawn; the end-effector by default.
+    point : str or sequence of str, optional
+        Point "body.point" whose trail is drawn, or several; the end-effector by default.
     """
 
     magnify: float | None = None
@@ -247,7 +247,7 @@ class FilmOptions:
     theme: str = "light"
     at: float | None = None
     model: str | None = None
-    point: str | None = None
+    point: str | Sequence[str] | None = None
 
 
 def plan_film(
@@ -300,9 +300,10 @@ def plan_film(
             )  # fmt: skip
         times = np.linspace(first, last, max(count, 2))
     magnify = default_magnification(runs) if options.magnify is None else options.magnify
-    scenes = tuple(scene(run, times, magnify, options.point) for run in runs)
+    points = [options.point] if isinstance(options.point, str) else list(options.point or ())
+    scenes = tuple(scene(run, times, magnify, points) for run in runs)
     size, look = _size(scenes, options.size), theme(options.theme)
-    return Film(scenes, size, fps, speed, look, kind != ".png", options.point)
+    return Film(scenes, size, fps, speed, look, kind != ".png", points)
 
 
 @checked_arguments()

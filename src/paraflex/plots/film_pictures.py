@@ -1,7 +1,7 @@
 """Pictures of a film, drawn one after the other by Matplotlib."""
 
 import math
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -40,8 +40,8 @@ class Film(Shown):
         Colours.
     plays : bool
         Whether the film has several pictures (default) or is a still picture.
-    point : str, optional
-        Requested point "body.point" whose trail is drawn; None for the end-effector.
+    points : sequence of str
+        Requested points "body.point" whose trails are drawn; empty for those drawn by default.
     """
 
     scenes: tuple[Scene, ...]
@@ -50,12 +50,12 @@ class Film(Shown):
     speed: float
     look: Theme
     plays: bool = True
-    point: str | None = None
+    points: Sequence[str] = ()
 
     @property
     def caption(self) -> str:
-        """Text that states the magnification, the speed, and the requested point whose trail is drawn."""
-        trail = f", trail of {plain(self.point)}" if self.point else ""
+        """Text that states the magnification, the speed, and the requested points whose trails are drawn."""
+        trail = f", trail of {', '.join(map(plain, self.points))}" if self.points else ""
         return caption(self.scenes[0]) + (f", speed × {self.speed:g}" if self.plays else "") + trail
 
     @property

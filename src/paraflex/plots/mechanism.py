@@ -1,5 +1,6 @@
 """Sketch of a mechanism in one pose, from positions alone, and the desired path in the workspace (Fig. 11)."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -87,7 +88,7 @@ def mechanism_drawing(
         raise InputError("outside the run", field="time", value=time, remedy=f"choose it from {first:g} to {last:g} s")
     until = run["time"].values
     magnify = default_magnification([run]) if magnify is None else magnify
-    shown = scene(run, np.append(until[until < time], time), magnify, point)
+    shown = scene(run, np.append(until[until < time], time), magnify, [] if point is None else [point])
     limits, aspect = shown.limits.filling(0.4, 1.25)
     height = width * aspect + HEAD + FOOT
     figure = Figure(figsize=(width * MM, height * MM), facecolor=look.ground)
@@ -95,8 +96,9 @@ def mechanism_drawing(
     sketch = Sketch(axes, shown, limits, look, width=0.5)
     sketch.show(len(shown.time) - 1)
     stations = dict(zip(names_of(run, "point"), run["point_station"].values.tolist(), strict=True))
-    followed = [name for name, station in stations.items() if station == shown.followed]
-    _name_marks(sketch, point or run.attrs.get("end_effector_point") or next(iter(followed), ""))
+    effector = point or run.attrs.get("end_effector_point")
+    names = {station: name for name, station in reversed(stations.items())}
+    _name_marks(sketch, [effector] if effector else [names.get(station, "") for station in shown.followed])
     draw_scale_bar(figure, sketch.limits, look, (0.98, 1.5 / height), 6.5)
     draw_load_keys(figure, shown, sketch.limits, look, (0.02, 2.5 / height), 6.5)
     title = [shown.mechanism, *([f"mode {plain(shown.mode)}"] if shown.mode else [])]
@@ -113,17 +115,18 @@ def mechanism_drawing(
     return figure
 
 
-def _name_marks(sketch: Sketch, followed: str) -> None:
-    """Write the names of joints, if there are few, and of the point whose trail is drawn, at the scene's last time."""
+def _name_marks(sketch: Sketch, followed: Sequence[str]) -> None:
+    """Write the names of joints, if there are few, and of the points with trails, at the scene's last time."""
     shown, look = sketch.scene, sketch.look
     joints = [joint for joint in shown.joints if np.isfinite(joint.place[-1]).all()]
     drawn = [figure_of(places[-1:])[0] for places in shown.bodies.values()]
     drawn += [mark.places[-1] for mark in (*still_marks(shown, sketch.limits), *moving_marks(shown, sketch.limits))]
     names = [Name(text_symbol(joint.name), joint.place[-1:], look.ink) for joint in joints]
     names = names if len(names) <= _MOST_NAMED else []
-    if shown.trail is not None and np.isfinite(shown.trail[-1]).all():
-        names.insert(0, Name(followed, shown.trail[-1:], look.trail, bold=True))
-        drawn.append(shown.trail)
+    for name, trail in zip(followed, shown.trails, strict=False):
+        if np.isfinite(trail[-1]).all():
+            names.insert(0, Name(name, trail[-1:], look.trail, bold=True))
+            drawn.append(trail)
     place_names(sketch.axes, names, drawn, _TEXT)
 
 
@@ -206,7 +209,7 @@ def _scene(points: Array, names: list[str], joints: tuple[DrawnJoint, ...]) -> S
     outlines = {name: points[None, ks][:, figure_order(points[ks])] for name, ks in bodies.items()}
     return Scene(
         mechanism="", mode="", time=np.zeros(1), magnified=1.0, bodies=outlines, stiff={}, joints=joints, springs={},
-        gears=(), anchors=(), followed=None, trail=None, desired=None, reached=0.0, limits=limits_of(points),
+        gears=(), anchors=(), followed=(), trails=(), desired=None, reached=0.0, limits=limits_of(points),
     )  # fmt: skip
 
 

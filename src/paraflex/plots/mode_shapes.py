@@ -57,4 +57,4 @@ def mode_shapes(data: xr.Dataset, mode: str | None = None, count: int = 4, theme
 def _scene(data: xr.Dataset, one: DrawnMode) -> Scene:
     """Return the scene of a mode shape at its largest displacement."""
     shown = scene(modal_motion(data, one, _QUARTER, 0.6 * SWING), _QUARTER, 2.0)
-    return replace(shown, trail=None, followed=None)
+    return replace(shown, trails=(), followed=())

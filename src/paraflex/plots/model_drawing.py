@@ -117,7 +117,7 @@ def _scene(posed: Posed) -> Scene:
     if len(places):
         shown = replace(shown, limits=common_limits([shown, replace(shown, limits=limits_of(places))]))
     shown = replace(shown, desired=posed.desired, joints=tuple(joints), anchors=(*shown.anchors, *anchors))
-    return shown if posed.mechanism.end_effector is not None else replace(shown, trail=None, followed=None)
+    return shown if posed.mechanism.end_effector is not None else replace(shown, trails=(), followed=())
 
 
 def _rows(words: list[str], width: float) -> int:
@@ -255,9 +255,9 @@ def _joint_names(posed: Posed, shown: Scene, look: Theme) -> list[Name]:
 def _other_names(posed: Posed, shown: Scene, limits: Limits, look: Theme) -> list[Name]:
     """Return the names of the end-effector, the path, springs, gears, and ground points without a joint."""
     mechanism, names = posed.mechanism, []
-    if mechanism.end_effector is not None and shown.trail is not None:
+    if mechanism.end_effector is not None and shown.trails:
         ref = mechanism.end_effector.point
-        names.append(Name(f"end-effector {ref}", shown.trail[:1], look.trail, bold=True))
+        names.append(Name(f"end-effector {ref}", shown.trails[0][:1], look.trail, bold=True))
     if posed.desired is not None:
         names.append(Name(f"path {posed.path}", along(posed.desired, (0.3, 0.6, 0.85, 0.05)), look.desired))
     names += [Name(f"spring {name}", ends[0].mean(axis=0)[None], look.earth) for name, ends in shown.springs.items()]
@@ -280,7 +280,7 @@ def _free_points(mechanism: Mechanism) -> list[PointRef]:
 def _named_points(posed: Posed, shown: Scene, limits: Limits) -> dict[str, Array]:
     """Return the positions (2,) of points of bodies that are away from joints and end-effector; none of too many."""
     free = _free_points(posed.mechanism)
-    taken = [joint.place[0] for joint in shown.joints] + ([] if shown.trail is None else [shown.trail[0]])
+    taken = [joint.place[0] for joint in shown.joints] + [trail[0] for trail in shown.trails]
     places = {str(ref): posed.place(ref) for ref in free} if len(free) <= _MOST_POINTS else {}
     return {
         name: place for name, place in places.items()

@@ -14,6 +14,7 @@ import numpy as np
 
 from paraflex.arrays import Array, Brief
 from paraflex.errors import InputError, suggestion
+from paraflex.figures.kinematics import coupler_points
 from paraflex.figures.selection import names_of, point_number, select_run
 from paraflex.figures.shapes import figure_of
 from paraflex.folders import RESULT_KINDS
@@ -150,10 +151,10 @@ class Scene(Brief):
         Gears and similar members.
     anchors : tuple of (2,) arrays
         Points at which springs are attached to the ground [m].
-    followed : int or None
-        Index of the station whose trail is drawn, among the stations of all bodies.
-    trail : (f, 2) array or None
-        Path of that station, by default the end-effector [m].
+    followed : tuple of int
+        Indices of the stations whose trails are drawn, among the stations of all bodies.
+    trails : tuple of (f, 2) arrays
+        Paths of these stations, by default of the end-effector [m].
     desired : (d, 2) array or None
         Entire desired path of the end-effector [m].
     reached : float
@@ -176,8 +177,8 @@ class Scene(Brief):
     springs: dict[str, Array]
     gears: tuple[DrawnGear, ...]
     anchors: tuple[Array, ...]
-    followed: int | None
-    trail: Array | None
+    followed: tuple[int, ...]
+    trails: tuple[Array, ...]
     desired: Array | None
     reached: float
     limits: Limits
@@ -225,7 +226,7 @@ def select(data: xr.Dataset, mode: str | None, model: str | None = None) -> xr.D
     return data
 
 
-def scene(run: Run, times: Array, magnify: float = 1.0, point: str | None = None) -> Scene:
+def scene(run: Run, times: Array, magnify: float = 1.0, points: Sequence[str] = ()) -> Scene:
     """Describe a run at given times with magnified deflections.
 
     Parameters
@@ -236,8 +237,8 @@ def scene(run: Run, times: Array, magnify: float = 1.0, point: str | None = None
         Times of the pictures [s]; after the end of a run its last state is repeated.
     magnify : float
         Magnification of deflections: 1 (default) draws them as they are, 0 draws undeformed links.
-    point : str, optional
-        Point "body.point" whose trail is drawn; see `followed_station` for the default.
+    points : sequence of str
+        Points "body.point" whose trails are drawn; see `followed_stations` for the default.
 
     Returns
     -------
@@ -266,7 +267,7 @@ def scene(run: Run, times: Array, magnify: float = 1.0, point: str | None = None
     bodies = {str(name): owners == name for name in dict.fromkeys(owners.tolist())}
     places, directions = (_magnified_joints(run, name, magnify) for name in ("joint_position", "joint_direction"))
     joints = _joints(run, drawn, places, directions, at)
-    springs, followed = _springs(run, drawn), followed_station(run, point)
+    springs, followed = _springs(run, drawn), followed_stations(run, points)
     seen = [drawn, places, *springs.values(), *([] if desired is None else [desired])]
     seen += [line for gear in _gears(run, places, directions) for line in gear.lines]
     loads = _loads(run, drawn, time, times, at)
@@ -286,7 +287,7 @@ def scene(run: Run, times: Array, magnify: float = 1.0, point: str | None = None
         gears=_gears(run, at(places), at(directions)),
         anchors=_anchors(run),
         followed=followed,
-        trail=None if followed is None else at(drawn[:, followed]),
+        trails=tuple(at(drawn[:, one]) for one in followed),
         desired=desired,
         reached=float(time[-1]),
         limits=limits_of(_with_rails(reach, joints)),
@@ -351,17 +352,18 @@ class _Sampler:
         return (1.0 - part) * values[self.first] + part * values[self.last]
 
 
-def followed_station(run: Run, point: str | None = None) -> int | None:
-    """Return the station whose trail is drawn: that of a given point, by default the end-effector.
+def followed_stations(run: Run, given: Sequence[str] = ()) -> tuple[int, ...]:
+    """Return the stations whose trails are drawn: those of given points, by default the end-effector.
 
-    Without an end-effector it is the point with the longest path, free points before joints; None if nothing moves.
+    Without an end-effector they are the points whose coupler curves kinematics describes, or else the point with the
+    longest path, free points before joints; none if nothing moves.
     """
     points = names_of(run, "point")
     stations = run["point_station"].values
-    if point is not None:
-        return int(stations[point_number(run, point)])
-    if run.attrs.get("end_effector_point") in points:
-        return int(stations[points.index(run.attrs["end_effector_point"])])
+    effector = run.attrs.get("end_effector_point")
+    given = given or ([effector] if effector in points else coupler_points(run.attrs))
+    if given:
+        return tuple(int(stations[point_number(run, point)]) for point in given)
     shape, joints = run["shape"].values.astype(float), run["joint_position"].values.astype(float)
     ways, free = {}, []
     for station in stations.tolist():
@@ -373,8 +375,8 @@ def followed_station(run: Run, point: str | None = None) -> int | None:
     for chosen in (free, [*ways]):
         farthest = max(chosen, key=lambda station: ways[station], default=None)
         if farthest is not None and ways[farthest] >= _STILL_POINT:
-            return farthest
-    return None
+            return (farthest,)
+    return ()
 
 
 def _anchors(run: Run) -> tuple[Array, ...]:

@@ -77,8 +77,7 @@ def sketch(mechanism: Mechanism) -> str:
 def moving_elements(shown: Scene, limits: Limits, pen: Pen) -> list[str]:
     """Return the elements of all parts but ground and desired path, back to front; a scene of one time is still."""
     look, out = pen.look, []
-    if shown.trail is not None:
-        out.append(_trail(shown.trail, pen))
+    out += [_trail(trail, pen) for trail in shown.trails]
     faint = f'fill="none" stroke="{look.faint}" {_wide(1.3, pen)}'
     out += [_line(places, faint, "", pen) for places in shown.stiff.values()]
     for number, (name, places) in enumerate(shown.bodies.items()):
@@ -90,8 +89,7 @@ def moving_elements(shown: Scene, limits: Limits, pen: Pen) -> list[str]:
         stroke = f'stroke="{colour}" {_wide(_LINK, pen)} stroke-linecap="round" stroke-linejoin="round"'
         out.append(_line(drawn, f"{fill} {stroke}", name, pen))
     out += [_mark(mark, pen) for mark in moving_marks(shown, limits)]
-    if shown.trail is not None:
-        out.append(_dot(shown.trail, _TIP, f'fill="{look.trail}"', "", pen))
+    out += [_dot(trail, _TIP, f'fill="{look.trail}"', "", pen) for trail in shown.trails]
     return [line for line in out if line]
 
 

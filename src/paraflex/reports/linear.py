@@ -67,7 +67,7 @@ def _film(data: xr.Dataset, drawn: Sequence[DrawnMode]) -> Animation | None:
     if film is None:
         return None
     scenes, stiff = (
-        [None if one is None else replace(one, followed=None, trail=None) for one in each]
+        [None if one is None else replace(one, followed=(), trails=()) for one in each]
         for each in (film.scenes, film.stiff)
     )
     time = np.linspace(0.0, _PERIOD, _FRAMES)

@@ -38,7 +38,9 @@ class AnimateRequest:
     theme: str = option("--theme light|dark", "Colours.", default="light")
     at: float | None = option("--at S", "Time of one picture. Default: half way.", unit="s")
     model: str | None = option("--model NAME", "Model of a verification. Default: its reference.")
-    point: str | None = option("--point BODY.POINT", "Point whose trail is drawn. Default: the end-effector.")
+    point: list[str] = repeatable(
+        "--point BODY.POINT", "Point whose trail is drawn; repeatable. Default: end-effector."
+    )
     force: bool = _overwrite()
 
 

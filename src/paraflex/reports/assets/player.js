@@ -266,7 +266,7 @@ const player = (() => {
       const [still, moving] = film.marks[state.run], [ground, points] = arrays.marks[state.run].map((one) => at(one, 0, before, share));
       const swing = arrays.swing[state.run] && at(arrays.swing[state.run], 0, before, share);
       if (swing) for (let k = 0; k < points.length; k++) points[k] += (state.magnify - 1) * swing[k];
-      const drawn = base.map((value, k) => value + state.magnify * bend[k]), tip = film.tips[state.run];
+      const drawn = base.map((value, k) => value + state.magnify * bend[k]), tips = film.tips[state.run] || [];
       pen.lineCap = pen.lineJoin = "round";
       drawMarks(still, ground);
       pen.globalAlpha = stopped ? 0.45 : 1;
@@ -282,9 +282,9 @@ const player = (() => {
         pen.lineWidth = 3.6; line(drawn, from, to);
       });
       // Over the links: they often lie along it.
-      if (tip !== null) drawTrail(before, drawn, tip);
+      for (const tip of tips) drawTrail(before, drawn, tip);
       drawMarks(moving, points);
-      if (tip !== null) {
+      for (const tip of tips) {
         pen.fillStyle = colours.trail; pen.strokeStyle = colours.card; pen.lineWidth = 1.5;
         pen.beginPath(); pen.arc(px(drawn[2 * tip]), py(drawn[2 * tip + 1]), 5, 0, 2 * Math.PI); pen.fill(); pen.stroke();
       }
@@ -369,7 +369,7 @@ const player = (() => {
     }
     // Rigid links have no deflections to magnify.
     if (!film.bends) for (const name of ["has-magnify", "has-ghost", "key-magnify"]) byId(name).hidden = true;
-    byId("has-trail").hidden = film.tips.every((tip) => tip === null);
+    byId("has-trail").hidden = film.tips.every((tips) => !tips || !tips.length);
     const names = ["base", "bend", "path"];
     const read = await Promise.all(names.map((name) => (film[name] ? report.unpacked(film[name]) : null)));
     const marks = await Promise.all(film.marks.map((sets) => Promise.all((sets || []).map((set) => report.unpacked(set.places)))));
