@@ -343,6 +343,17 @@ def test_ramps_are_parabolas_that_meet_in_value_and_rate(tmp_path):
     assert profile.knots == (0.2, 0.5)
 
 
+def test_ramps_from_a_file_are_those_of_the_list(tmp_path):
+    (tmp_path / "speed.csv").write_text("t [ms],speed [rpm]\n0,0\n200,60\n1000,0\n", encoding="utf-8")
+    read = profile_of(tmp_path, 'ramps = "speed.csv"')
+    given = profile_of(tmp_path, 'ramps = [[0, 0], ["0.2 s", "60 rpm"], [1, 0]]')
+    t = np.linspace(0.0, 1.0, 21)
+    assert np.allclose(read.evaluate(t), given.evaluate(t), rtol=1e-12, atol=1e-12)
+    (tmp_path / "speed.csv").write_text("t,speed [mm]\n0,0\n1,60\n", encoding="utf-8")
+    with pytest.raises(InputError, match=r"prescribed.drive.ramps: column 2 of speed.csv is in m where rad/s"):
+        profile_of(tmp_path, 'ramps = "speed.csv"')
+
+
 def test_a_run_follows_ramps_from_its_assembly_and_files_keep_them(tmp_path):
     model = load(write(tmp_path, "ramps = [[0, 0], [0.5, 4], [1, 4]]"))
     run = simulate_motion(model, 1.0, samples=3, warning=False)

@@ -53,15 +53,15 @@ def with_rows(data: dict[str, Any], folder: Path, allowed: Container[Any] = ()) 
         File outside the folder without permission, unreadable file, wrong number of columns, anything but numbers below
         one line of headings, or unit that does not fit its column.
     """
-    if not any(isinstance(entry.get("table"), str) for _, entry, _ in _entries(data)):
+    if not any(isinstance(entry.get(place[-1]), str) for place, entry, _ in _entries(data)):
         return data
     data = copy.deepcopy(data)
     for place, entry, columns in _entries(data):
-        file = entry.get("table")
+        file = entry.get(place[-1])
         if isinstance(file, str):
             if not (Path(file).is_absolute() and file in allowed):
                 check_outside(folder, file, _field(place))
-            entry["table"] = _read_rows(data, place, folder, file, columns)
+            entry[place[-1]] = _read_rows(data, place, folder, file, columns)
     return data
 
 
@@ -70,31 +70,31 @@ def with_names(data: dict[str, Any], text: str, folder: Path) -> dict[str, Any]:
 
     A name is taken from the text of the model file, if that file, relative to the folder, still has these rows.
     """
-    named = {place: entry.get("table") for place, entry, _ in _entries(tomllib.loads(text))}
+    named = {place: entry.get(place[-1]) for place, entry, _ in _entries(tomllib.loads(text))}
     data = copy.deepcopy(data)
     for place, entry, columns in _entries(data):
         file = named.get(place)
         with suppress(InputError):
-            if isinstance(file, str) and _read_rows(data, place, folder, file, columns) == entry.get("table"):
-                entry["table"] = file
+            if isinstance(file, str) and _read_rows(data, place, folder, file, columns) == entry.get(place[-1]):
+                entry[place[-1]] = file
     return data
 
 
 def _entries(data: dict[str, Any]) -> Iterator[tuple[Place, dict[str, Any], tuple[int, ...]]]:
-    """Yield place, table and numbers of columns of all tables of a model that may name a file as their `table`."""
-    for group in ("prescribed", "load"):
+    """Yield place of rows that may be the name of a file, the table that contains them, and numbers of columns."""
+    for group, key in (("prescribed", "table"), ("prescribed", "ramps"), ("load", "table")):
         for name, entry in _tables(data.get(group)):
-            yield (group, name), entry, _THREE if group == "load" and entry.get("type") == "force" else _TWO
+            yield (group, name, key), entry, _THREE if group == "load" and entry.get("type") == "force" else _TWO
     study = data.get("study")
     for name, entry in _tables(study.get("torques") if isinstance(study, dict) else None):
-        yield ("study", "torques", name), entry, _TWO
+        yield ("study", "torques", name, "table"), entry, _TWO
     paths: Any = data.get("path")
     # In a file with one path, the table itself takes the place of the names.
     if isinstance(paths, dict) and isinstance(paths.get("type"), str):
-        yield ("path",), paths, _PATH
+        yield ("path", "table"), paths, _PATH
         return
     for name, entry in _tables(paths):
-        yield ("path", name), entry, _PATH
+        yield ("path", name, "table"), entry, _PATH
 
 
 def _tables(given: Any) -> list[tuple[str, dict[str, Any]]]:
@@ -119,7 +119,7 @@ def _read_rows(
 
 
 def _field(place: Place) -> str:
-    return ".".join(map(str, (*place, "table")))
+    return ".".join(map(str, place))
 
 
 def _rows_of(
@@ -150,7 +150,7 @@ def _rows_of(
 
 def _in_si(data: dict[str, Any], place: Place, file: str, headings: str, rows: list[list[float]]) -> list[list[float]]:
     """Convert rows to SI units from the units that the headings give in brackets."""
-    schema = PathFile if place == ("path",) else ModelTable
+    schema = PathFile if place == ("path", "table") else ModelTable
     field = _field(place)
     found = [list(column) for column in zip(*rows, strict=True)]
     for k, (heading, text) in enumerate(_units(headings, len(found), file, field)):
@@ -160,8 +160,8 @@ def _in_si(data: dict[str, Any], place: Place, file: str, headings: str, rows: l
         if unit is None:
             _, remedy = unknown_unit(f"1 {text}") or ("", 'write units like "ms", "N m" or "deg"')
             raise InputError(f'{where} has the unknown unit "{text}"', field=field, value=heading, remedy=remedy)
-        given = overlaid(data, [((*place, "table"), [[0.0] * len(found)])])
-        units = units_at(schema, given, (*place, "table", 0, k))
+        given = overlaid(data, [(place, [[0.0] * len(found)])])
+        units = units_at(schema, given, (*place, 0, k))
         if units is not None and unit.dimension not in [unit_named(one).dimension for one in units]:
             raise InputError(
                 f"{where} is in {dimension_text(unit.dimension)} where {' or '.join(units)} is asked for", field=field,

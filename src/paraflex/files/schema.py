@@ -450,7 +450,7 @@ class PrescribedTable(_Table):
         "the speed in rad/s, from a constant start value: a number, or an expression of the time t"
     )
     ramps: Rows | None = _optional(
-        "a list of [t, speed] in s and rad/s, between which the speed changes at constant rates"
+        "a list of [t, speed] in s and rad/s, between which the speed changes at constant rates, or the name of a file"
     )
     pieces: Annotated[list[PieceTable], Field(min_length=1)] | None = _optional(
         'a list of { until = s, angle = "..." }, or of { until = s, speed = "..." }, the last without until'
