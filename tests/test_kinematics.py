@@ -652,14 +652,16 @@ def test_the_commands_write_results_that_other_commands_take(rocker, tmp_path):
     data = json.loads(re.search(r'<script type="application/json" id="report-data">(.*?)</script>', page, re.DOTALL)[1])
     assert data["abscissae"][data["over"] - 1]["name"] == "angle of O"
     assert not data["film"]["bends"]
-    assert {each.stem for each in (folder / "figures").iterdir()} == {"motion_overview", "point_paths"}
+    assert {each.stem for each in (folder / "figures").iterdir()} == {"joint_motions", "motion_overview", "point_paths"}
     summary = json.loads((folder / "summary.json").read_text(encoding="utf-8"))
     assert summary["kinematics"]["time_ratios"]["Q"] == pytest.approx(1.0374965917973495)
     # Without masses no force has a value, and none is zero.
     assert all(one["force_max"] is None for one in summary["loads"]["joints"].values())
     assert summary["loads"]["drives"]["O"]["torque_max"] is None
     assert paraflex("plot", folder, "--out", tmp_path / "figures").returncode == 0
-    done = paraflex("torques", "four_bar", "--speed", "100 rpm", "--drive", "O", "--fluctuation", "0.02")
+    words = ("four_bar", "--speed", "100 rpm", "--drive", "O", "--fluctuation", "0.02", "--no-report")
+    done = paraflex("torques", *words, "--out", tmp_path / "torques")
+    assert {"drive_efforts", "joint_forces", "frame_loads"} <= {each.stem for each in tmp_path.glob("torques/figures/*")}
     assert "flywheel for a fluctuation of 0.02: 0.0754 kg m^2" in done.stdout
 
 

@@ -142,7 +142,7 @@ def test_the_film_is_the_shapes_of_the_dataset_also_magnified(page):
     assert shown["bodies"][-1][2] == data.sizes["station"]
     still, _ = shown["marks"][0]
     assert sum(look == "ground" for look, *_ in still["pieces"]) == 4
-    np.testing.assert_allclose((base + bend)[0, :, shown["tips"][0]], data["end_effector"].values[0], atol=1e-5)
+    np.testing.assert_allclose((base + bend)[0, :, shown["tips"][0][0]], data["end_effector"].values[0], atol=1e-5)
     np.testing.assert_allclose(array_of(shown["path"])[0], data["end_effector_desired"].values[0], atol=1e-5)
 
 
@@ -455,7 +455,7 @@ def test_a_run_without_a_path_has_a_report(tmp_path):
     # The bob has no joint: its trail is drawn.
     shown = page["film"]
     np.testing.assert_allclose(
-        (array_of(shown["base"]) + array_of(shown["bend"]))[0, :, shown["tips"][0]],
+        (array_of(shown["base"]) + array_of(shown["bend"]))[0, :, shown["tips"][0][0]],
         data["point_position"].sel(point="beam.tip"),
         atol=1e-4,
     )

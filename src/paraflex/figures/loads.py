@@ -9,6 +9,7 @@ import xarray as xr
 
 from paraflex.formatting import NO_VALUE, common_unit, number, peak, text_symbol
 from paraflex.results.beam_stresses import CONTACT, stresses_of
+from paraflex.results.kinematics import KINEMATICS, RIGID_TORQUES
 from paraflex.results.loads import resolved_error, sliding_joints
 from paraflex.units import EFFORTS
 from .charts import DOTTED, Axis, Chart, Curve, look
@@ -85,7 +86,7 @@ def _under_contacts(run: xr.Dataset, body: str) -> np.ndarray:
 
 @figure(
     "magnitude of the force in every joint over time", heading="Joints", takes="mode", variables=("joint_force",),
-    height=56.0,
+    height=56.0, written_as="joint_forces", written_with=(RIGID_TORQUES,),
 )  # fmt: skip
 def joint_forces(data: xr.Dataset) -> Iterator[Chart]:
     """Yield the chart of the magnitudes of all joint forces or of one, with components if there is a single run."""
@@ -108,7 +109,7 @@ def joint_forces(data: xr.Dataset) -> Iterator[Chart]:
 
 @figure(
     "angle or travel of every joint, and its rate, over time", heading="Joints", takes="mode",
-    variables=("joint_coordinate",), columns=2, height=44.0,
+    variables=("joint_coordinate",), columns=2, height=44.0, written_as="joint_motions", written_with=(KINEMATICS,),
 )  # fmt: skip
 def joint_motions(data: xr.Dataset) -> Iterator[Chart]:
     """Yield charts of angle and rate of the joints that turn, and of travel and speed of those that slide."""
@@ -126,7 +127,8 @@ def joint_motions(data: xr.Dataset) -> Iterator[Chart]:
             yield followed(chart, data, values.transpose("mode", "time", "joint"))
 
 
-@figure("torque, speed and power of motors and prescribed motions", heading=_LOADS, takes="mode", height=34.0)
+@figure("torque, speed and power of motors and prescribed motions", heading=_LOADS, takes="mode", height=34.0,
+        written_as="drive_efforts", written_with=(RIGID_TORQUES,))  # fmt: skip
 def drive_efforts(data: xr.Dataset) -> Iterator[Chart]:
     """Yield charts of torque or force, speed and power of motors and prescribed motions over time."""
     torque = "torque" if "torque" in data else "applied_torque"
@@ -162,7 +164,7 @@ def drive_efforts(data: xr.Dataset) -> Iterator[Chart]:
 
 @figure(
     "shaking force and moment of the mechanism on the ground", heading=_LOADS, takes="mode", variables=("frame_force",),
-    height=40.0,
+    height=40.0, written_as="frame_loads", written_with=(RIGID_TORQUES,),
 )  # fmt: skip
 def frame_loads(data: xr.Dataset) -> Iterator[Chart]:
     """Yield charts of force and moment of the mechanism on the ground, the latter about the origin."""

@@ -80,7 +80,7 @@ def with_names(data: dict[str, Any], text: str, folder: Path) -> dict[str, Any]:
     return data
 
 
-def _entries(data: dict[str, Any]) -> Iterator[tuple[Place, dict[str, Any], tuple[int, ...]]]:
+def _entries(data: dict[str, Any]) -> Iterator[tuple[tuple[str, ...], dict[str, Any], tuple[int, ...]]]:
     """Yield place of rows that may be the name of a file, the table that contains them, and numbers of columns."""
     for group, key in (("prescribed", "table"), ("prescribed", "ramps"), ("load", "table")):
         for name, entry in _tables(data.get(group)):

@@ -198,7 +198,7 @@ def _draw_mechanism(axes: Axes, data: xr.Dataset) -> tuple[list[Name], list[Arra
 def _of_shapes(run: xr.Dataset) -> Scene:
     """Return the scene of the start pose in mm, with rails as long as the travel of the run."""
     in_mm = run.assign({name: _MM * run[name].astype(float) for name in _LENGTHS if name in run})
-    return replace(scene(in_mm, np.linspace(*run_times(run), _POSES)), trail=None, desired=None, loads=())
+    return replace(scene(in_mm, np.linspace(*run_times(run), _POSES)), trails=(), desired=None, loads=())
 
 
 def _scene(points: Array, names: list[str], joints: tuple[DrawnJoint, ...]) -> Scene:
