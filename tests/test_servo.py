@@ -114,6 +114,12 @@ def test_a_motor_written_as_its_joint_alone_takes_the_field():
             pf.load("five_bar", set={field: "1 mm"})
 
 
+@pytest.mark.parametrize("wrong", ["path", 3, True])
+def test_a_motor_follows_nothing_but_the_plan(wrong):
+    with pytest.raises(InputError, match=r"motor.left.follows: unknown motion to follow .*plan"):
+        pf.Motor("left", "A1", wrong)
+
+
 @pytest.mark.parametrize(
     ("act", "message"),
     [

@@ -13,7 +13,7 @@ from typing import Any, ClassVar, Literal
 from paraflex.arguments import CheckedFields, checked_arguments, named_in_errors
 from paraflex.errors import InputError, within
 from .profiles import TimeProfile, check_motion
-from .quantities import AT_JOINT, JointThat, enter_kind, field_metadata, finite, optional, positive
+from .quantities import AT_JOINT, JointThat, enter_kind, field_metadata, finite, known, optional, positive
 
 GROUND = "ground"
 
@@ -301,3 +301,8 @@ class Motor(CheckedFields):
     name: str
     joint: str = field(metadata=AT_JOINT)
     follows: Literal["plan"] | None = optional(None, '"plan" for a motor that holds its joint on the planned motion')
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.follows is not None:
+            known(self.follows, ["plan"], f"motor.{self.name}.follows", "motion to follow")
