@@ -661,7 +661,8 @@ def test_the_commands_write_results_that_other_commands_take(rocker, tmp_path):
     assert paraflex("plot", folder, "--out", tmp_path / "figures").returncode == 0
     words = ("four_bar", "--speed", "100 rpm", "--drive", "O", "--fluctuation", "0.02", "--no-report")
     done = paraflex("torques", *words, "--out", tmp_path / "torques")
-    assert {"drive_efforts", "joint_forces", "frame_loads"} <= {each.stem for each in tmp_path.glob("torques/figures/*")}
+    drawn = {each.stem for each in tmp_path.glob("torques/figures/*")}
+    assert {"drive_efforts", "joint_forces", "frame_loads"} <= drawn
     assert "flywheel for a fluctuation of 0.02: 0.0754 kg m^2" in done.stdout
 
 
