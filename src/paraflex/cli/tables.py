@@ -6,6 +6,7 @@ import json
 import textwrap
 from collections.abc import Container, Iterable, Iterator, Sequence
 from contextlib import suppress
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rich import box
@@ -26,10 +27,19 @@ if TYPE_CHECKING:
 _BETWEEN, _HEAD, _WRAPPED = 2, 9, 26
 
 
-def in_own_units(data: Any) -> Any:
-    """Return results, to be shown in the units of the [units] of their model's file unless others are chosen."""
+def in_own_units(data: Any, folder: Path | None = None) -> Any:
+    """Return results, to be shown in the units of the [units] of their model's file unless others are chosen.
+
+    The model is part of a dataset or of plain numbers; that of a study of many designs is in its folder.
+    """
+    from paraflex.campaign import STUDY, read_study  # imports xarray
+
     with suppress(AttributeError, KeyError, TypeError, ValueError):
-        prefer_units(json.loads(data.attrs["parameters"])["model"]["units"])
+        if folder is not None and (folder / STUDY).is_file():
+            model = read_study(folder / STUDY)["study"]["mechanism"]
+        else:
+            model = (data["parameters"] if isinstance(data, dict) else json.loads(data.attrs["parameters"]))["model"]
+        prefer_units(model["units"])
     return data
 
 
