@@ -78,9 +78,9 @@ def quantity_named(name: str, mechanism: Mechanism) -> Quantity:
     raise InputError("no such quantity", field="metrics", value=name, remedy=suggestion(name, near or names))
 
 
-def is_load(name: str) -> bool:
-    """Check whether a quantity is a load or deformation, which equilibria have as well."""
-    return name.rpartition(".")[2] in (*JOINT_LOADS, *_BODY_WORDS)
+def is_static(name: str) -> bool:
+    """Check whether equilibria have a quantity as well: a load, a deformation or a coordinate."""
+    return name.rpartition(".")[2] in (*JOINT_LOADS, *_BODY_WORDS, "angle", "travel", "x", "y")
 
 
 def _names(mechanism: Mechanism) -> Iterator[str]:
