@@ -62,8 +62,9 @@ class MetricMembers(dict[str, Sequence[str]]):
             names = {kind: tuple(one.name for one in each) for kind, each in coordinates.items()}
             super().__init__(names | {sliding(kind): straight for kind in names})
             return
-        found = {MOTOR: mechanism.motors, DRIVE: mechanism.prescribed, JOINT: mechanism.joints}
-        slides = {joint.name for joint in mechanism.joints if joint.slides}
+        whole = mechanism.described
+        found = {MOTOR: whole.motors, DRIVE: whole.prescribed, JOINT: whole.joints}
+        slides = {joint.name for joint in whole.joints if joint.slides}
         super().__init__(
             {kind: tuple(one.name for one in each) for kind, each in found.items()}
             | {
