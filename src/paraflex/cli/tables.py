@@ -114,8 +114,9 @@ def print_table(console: PlainConsole, shown: DescribedTable, title: str | None 
         heads = [[*textwrap.wrap(name, max(width, _HEAD), break_long_words=False, break_on_hyphens=False), below]
                  for width, (name, below) in zip(widths, heads, strict=True)]  # fmt: skip
     widths = [max(width, *map(len, head)) + _BETWEEN for width, head in zip(widths, heads, strict=True)]
-    first = sum(min(width, _WRAPPED) for width in widths[:names])
-    for k, part in enumerate(_fitting(widths, names, console.width - first)):
+    # Columns of words may be broken.
+    least = [width if of_numbers else min(width, _WRAPPED) for width, of_numbers in zip(widths, numeric, strict=True)]
+    for k, part in enumerate(_fitting(least, names, console.width - sum(least[:names]))):
         kept = [*range(names), *part]
         most = max(len(list(filter(None, heads[c]))) for c in kept)
         table = plain_table()
