@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 import scipy.linalg
 
+import paraflex as pf
 import twins
 from conftest import make_five_bar
 from paraflex.dynamics import build_system, consistent_state
@@ -101,6 +102,18 @@ def test_segments_converge_with_the_first_power():
     errors = np.array([first_frequency(n) for n in (8, 16, 32)]) / 1.8751040687119611**2 - 1.0
     assert 0.0 < errors[-1] < 0.1
     np.testing.assert_allclose(np.log2(errors[:-1] / errors[1:]), 1.0, atol=0.15)
+
+
+@pytest.mark.parametrize("n", [2, 8, 16])
+def test_a_clamped_link_lacks_the_bending_of_half_a_segment(n):
+    """Under a force at its tip it deflects by sum h (j h)^2 / E I over its hinges, for F L^3 / 3 E I of the beam."""
+    root, straight = RevoluteJoint("root", "ground.O", "beam.O"), Assembly("straight", {"beam": 0.0})
+    whole = Mechanism("arm", {"O": (0.0, 0.0)}, (UNIFORM,), (root,), assemblies=(straight,))
+    force = 1e-4
+    cut = finite_segments(whole, n).mechanism
+    found = pf.statics(cut, loads={f"beam_{n}.P.y": force}, held=["root"], steps=1, warning=False)
+    part = 3.0 * found.travel(f"beam_{n}.P.y")[-1] / force
+    assert part == pytest.approx((n - 1) * (2 * n - 1) / (2.0 * n**2), rel=1e-6)
 
 
 @pytest.mark.parametrize(
