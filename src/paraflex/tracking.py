@@ -41,7 +41,7 @@ from .findings import Finding, warn_of
 from .integrators import IntegrationOptions, Method, Solution, check_times, choose
 from .integrators.beam_ends import leave_beam
 from .integrators.between import SAMPLES
-from .mechanism import ActuationMode, Mechanism, Motor, finite_segments, parse_mode, standing
+from .mechanism import ActuationMode, Mechanism, Motor, finite_segments, parse_mode, standing, with_clamps
 from .mechanism.profiles import stops
 from .paths import ModelWithPaths, Path, RigidMotion, path_follower
 from .validity import Driven, Following, Validity, assess, implausible_results, warn, with_likely_cause
@@ -472,8 +472,11 @@ def _follow(
 ) -> TrackingRun:
     """Move along the path with the joints of the active motors held on the planned motion."""
     motors = [motor for motor in task.mechanism.motors if motor.name in torques.mode.motors]
-    profiles = planned_profiles(task.plan, torques, [motor.joint for motor in motors])
-    held = held_joints(task.system, task.start, profiles)
+    joints = [motor.joint for motor in motors]
+    profiles = planned_profiles(task.plan, torques, joints)
+    # Motors that follow the plan clamp the links; finite segments bend up to them then.
+    system = task.system if task.whole is None else build_system(with_clamps(task.mechanism, joints))
+    held = held_joints(system, task.start, profiles)
     signals, knots = still_signals(held.system.mechanism, float(task.motion.t[-1]))
     stops = np.unique(np.concatenate([path_stops(torques.knots, task.mechanism), knots]))
     own = [held.system.rows.index(row) for row in task.system.rows]
