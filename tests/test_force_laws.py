@@ -11,7 +11,7 @@ import paraflex as pf
 from conftest import make_five_bar
 from paraflex import ForceLaw, InputError
 from paraflex.dynamics import build_system
-from paraflex.dynamics.load_values import load_values
+from paraflex.dynamics.load_values import line_laws, load_values
 from paraflex.errors import IntegrationError
 from paraflex.files import ExpressionProfile, model_from
 from paraflex.integrators import IntegrationOptions
@@ -103,6 +103,76 @@ def test_a_characteristic_is_the_spring_that_it_stands_for():
     one, other = (pf.motion_dataset(run) for run in runs)
     assert_allclose(other["frame_force"], one["frame_force"], rtol=0, atol=1e-3)
     assert_allclose(other["frame_moment"], one["frame_moment"], rtol=0, atol=1e-3)
+
+
+def turned(joint):
+    """The other way round, the ground second."""
+    return replace(joint, a=joint.b, b=joint.a)
+
+
+def two_bars():
+    """Two bars in a row, pinned to each other and to the ground."""
+    bars = tuple(RigidBody(name, MASS, 0.02, points={"A": (0.0, 0.0), "B": (0.3, 0.0)}) for name in ("one", "two"))
+    joints = RevoluteJoint("root", "ground.O", "one.A"), RevoluteJoint("pin", "one.B", "two.A")
+    start = Assembly("start", {"one": 0.0, "two": 0.4})
+    return Mechanism("bars", {"O": (0.0, 0.0)}, bars, joints, gravity=(0.0, -9.81), assemblies=(start,))
+
+
+@pytest.mark.parametrize(
+    "made",
+    [
+        slider(0.0, joints=(replace(slider(0.0).joints[0], direction=2.0),), gravity=(3.0, -9.81)),
+        pendulum(gravity=(0.0, -9.81)),
+        pendulum(joints=tuple(map(turned, pendulum().joints)), gravity=(0.0, -9.81)),
+        two_bars(),
+    ],
+    ids=["slides", "turns", "turns, on the ground second", "turns between two bodies"],
+)
+def test_a_spring_with_a_law_is_the_spring_that_it_stands_for(made):
+    name, word = made.joints[-1].name, "travel" if made.joints[-1].slides else "angle"
+    law = ForceLaw(f"-k * ({name}.{word} - x0) - c * {name}.rate", {"k": K, "x0": REST, "c": DAMPING})
+    table = TabulatedProfile((-50.0, 50.0), (50.0 * K, -50.0 * K), "linear")
+    damper = (TorsionalDamper("c", name, DAMPING),)
+    one = replace(made, loads=(), springs=(TorsionalSpring("s", name, K, rest=REST, torque=law),))
+    over = TorsionalSpring("t", name, torque=ForceLaw(f"{name}.{word}", table=table))
+    two = replace(made, loads=(), springs=(over, TorsionalSpring("s", name, K, rest=2.0 * REST)), dampers=damper)
+    plain = replace(made, loads=(), springs=(TorsionalSpring("s", name, 2.0 * K, rest=REST),), dampers=damper)
+    wanted = simulate_motion(plain, 0.5, samples=6, options=FINE).solution
+    for own in (one, two):
+        assert (len(own.springs), len(own.loads)) == (1, 1)
+        found = simulate_motion(own, 0.5, samples=6, options=FINE).solution
+        assert_allclose(found.q, wanted.q, rtol=0, atol=1e-6)
+        assert_allclose(found.v, wanted.v, rtol=0, atol=2e-5)
+
+
+def test_results_have_the_law_of_a_spring_under_loads():
+    """The moment in a joint is that of its stiffnesses, motors and constraints; loads stand beside it."""
+    made = pendulum(springs=(TorsionalSpring("s", "pin", 3.0, torque=ForceLaw("-7 * pin.angle")),))
+    data = pf.motion_dataset(simulate_motion(made, 0.2, samples=5, options=FINE))
+    angle = data["joint_coordinate"].sel(joint="pin")
+    assert_allclose(data["load_torque"].sel(load="s"), -7.0 * angle, rtol=1e-12)
+    assert_allclose(data["joint_moment"].sel(joint="pin"), -3.0 * angle, rtol=0, atol=1e-3)
+    assert float(abs(angle).max()) > 0.3
+
+
+def test_a_law_of_a_spring_along_an_axis_that_moves_is_refused():
+    cart = RigidBody("cart", MASS, 0.02, points={"C": (0.0, 0.0)})
+    rail = PrismaticJoint("rail", "one.B", "cart.C")
+    start = Assembly("start", {"one": 0.0, "cart": 0.0})
+    moving = replace(two_bars(), bodies=(two_bars().bodies[0], cart), joints=(two_bars().joints[0], rail),
+                     assemblies=(start,))  # fmt: skip
+    with pytest.raises(InputError, match=r"^spring\.s\.torque: the axis of its joint moves.*\(got 'rail'\)"):
+        replace(moving, springs=(TorsionalSpring("s", "rail", torque=ForceLaw("-rail.travel")),))
+
+
+def test_a_constant_tension_does_the_work_of_its_shortening():
+    cord = LinearSpring("cord", PointRef("ground", "W"), PointRef("arm", "B"), force=ForceLaw("F", {"F": 7.0}))
+    run = simulate_motion(replace(tied(force=cord.force), linear_springs=(cord,), gravity=(0.0, 0.0)), 0.3, samples=7)
+    places = ["first(arm.B.x)", "first(arm.B.y)", "last(arm.B.x)", "last(arm.B.y)"]
+    x0, y0, x1, y1 = pf.metrics(run, places).values()
+    shorter = np.hypot(x0 - 0.1, y0 + 0.3) - np.hypot(x1 - 0.1, y1 + 0.3)
+    assert run.solution.kinetic_energy[-1] == pytest.approx(7.0 * shorter, rel=1e-4)
+    assert shorter > 0.05
 
 
 def test_a_load_and_its_reaction_leave_the_momentum_as_it_is():
@@ -246,6 +316,21 @@ def test_rigid_torques_name_a_law_that_is_not_finite():
         pf.torques(model, "guide", start=0.0, end=0.02, speed=0.1)
 
 
+def test_files_hold_laws_of_springs(tmp_path):
+    """A file has them as loads once it is saved; a force may be a number with a unit."""
+    springs = '[spring.s]\njoint = "guide"\ntorque = "-k * guide.travel - 2 N"\n[linear_spring.rope]\n'
+    springs += 'points = ["ground.O", "ram.T-1"]\nforce = "0.02 kN"\n[study]'
+    model = read(PRESS.replace("[study]", springs))
+    model.save(tmp_path / "again.toml")
+    again = pf.load(tmp_path / "again.toml").mechanism
+    assert again == model.mechanism
+    assert again.loads[-1] == PointForce(
+        "s", PointRef("ram", "B"), (ForceLaw("-k * guide.travel - 2 N", {"k": 4e4}), 0.0)
+    )
+    system = build_system(again)
+    assert line_laws(system, np.array([[0.021, 0.0, 0.0]]), np.zeros((1, 3)))[0, 1] == pytest.approx(20.0, rel=1e-12)
+
+
 def test_files_hold_laws(tmp_path):
     model = read()
     (force, vertical), torque = model.mechanism.loads[0].force, model.mechanism.loads[1].torque
@@ -279,7 +364,11 @@ def test_files_hold_laws(tmp_path):
         ("bumper.length_rate", "bumber.length_rate", "linear_spring.bumper.force: unknown spring between points"),
         ("bumper.length_rate", "bumper.rate", "linear_spring.bumper.force: unknown joint"),
         ('force = "k * (', 'length = 2 # "', "linear_spring.bumper: gives no force"),
-        ('force = "k * (', 'force = 5 # "', "linear_spring.bumper.force: contains no joint and no point"),
+        ('force = "k * (', 'force = "5 mm" # "', "a quantity in m where one in N is asked for"),
+        ("[study]", '[spring.s]\njoint = "guide"\n[study]', "spring.s: gives no torque; give the stiffness in N m/rad"),
+        ("[study]", '[spring.s]\njoint = "guide"\ntorque = "guid.travel"\n[study]', "spring.s.torque: unknown joint"),
+        ("[study]", '[spring.s]\njoint = "guide"\ntorque = "3 N m * guide.travel / 1 m"\n[study]', "where one in N is"),
+        ("[study]", '[spring.press]\njoint = "guide"\ntorque = 3\n[study]', "spring.press: a load has its name"),
         ('force = "k * (', 'force = "bumper.length * 1 m" # "', "a quantity in m^2 where one in N is asked for"),
         ('1000 * guide.travel"\ntable = [[0,', 'guide.travel"\ntable = [["0 kg",', "kg where one in m is asked for"),
         ('point = "ram.B"\nover', 'point = "ram.B"\nreaction = "ram.Q"\nover', "unknown point"),

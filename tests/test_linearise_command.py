@@ -125,6 +125,16 @@ def written(tmp_path_factory):
     return paraflex("linearise", "five_bar", *modes, "--force-at", "distal1.C", "--out", out), out
 
 
+def test_a_table_of_poles_stands_in_one_block(tmp_path):
+    """Its last column, of words, is broken where it is too wide; no block before it has the names of modes alone."""
+    text = library_text("slider_crank_flexible").replace("[body.rod]", "[body.rod]\ndamping = { stiffness = 1e-5 }")
+    (tmp_path / "damped.toml").write_text(text, encoding="utf-8")
+    done = paraflex("linearise", tmp_path / "damped.toml")
+    assert done.returncode == 0, done.stderr
+    assert "continued" not in done.stdout
+    assert ["mode", "motors", "lowest"] in [line.split() for line in done.stdout.partition("Poles")[2].splitlines()]
+
+
 def test_files_are_written_and_said(written):
     done, out = written
     assert done.returncode == 0, done.stderr

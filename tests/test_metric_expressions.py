@@ -1,5 +1,6 @@
 """Metrics by expression: against datasets of the same runs, differences of whole runs, and what they refuse."""
 
+import json
 from dataclasses import replace
 
 import numpy as np
@@ -11,7 +12,7 @@ from paraflex.designs.measure import measure, metrics_of
 from paraflex.designs.run import run_task
 from paraflex.errors import InputError
 from paraflex.formatting import display_unit, output_units
-from paraflex.mechanism import Encoder
+from paraflex.mechanism import Encoder, finite_segments
 from paraflex.results import motion_dataset, tracking_dataset
 from paraflex.results.metrics import METRICS, MetricMembers, metric_unit
 from paraflex.studies import metric_gradients
@@ -240,6 +241,27 @@ def test_a_motor_by_its_joint_and_a_name_for_two(crank):
     assert METRICS["max(O.fx)"].unit_of("", members) == "N"
 
 
+@pytest.mark.parametrize("segments", [1, 3])
+def test_beams_cut_into_segments_keep_the_names_of_their_points(segments):
+    """Against the dataset of the same run, which has the points of the whole beams; of segments nothing bends."""
+    motion = pf.simulate_motion(finite_segments(pf.load("four_bar").mechanism, segments).mechanism, 0.01, samples=11)
+    task = pf.load("raparm_i").plan("square", duration=0.02, samples=11).in_segments(segments)
+    for run, data, point in (
+        (motion, motion_dataset(motion), "rocker.B"), (tracked := pf.simulate(task, "++++"), None, "link1.B1")
+    ):  # fmt: skip
+        data = tracking_dataset([tracked]).isel(mode=0) if data is None else data
+        got = pf.metrics(run, [f"last({point}.{word})" for word in ("x", "y", "vx", "vy")])
+        wanted = [*taken(data, "point_position", point=point)[-1], *taken(data, "point_velocity", point=point)[-1]]
+        assert list(got.values()) == pytest.approx(wanted, rel=1e-9)
+        beam = point.partition(".")[0]
+        for word in ("stress", "deflection"):
+            with pytest.raises(InputError, match=f"{beam} is cut into rigid segments, which have no {word}"):
+                pf.metrics(run, [f"max({beam}.{word})"])
+    speeds = pf.metrics(tracked, ["joint_speed_max"])
+    assert list(speeds) == [f"joint_speed_max.{joint.name}" for joint in pf.load("raparm_i").mechanism.joints]
+    assert speeds["joint_speed_max.B1"] == pytest.approx(np.abs(taken(data, "joint_speed", joint="B1")).max(), rel=1e-9)
+
+
 def test_units_of_expressions_follow_the_output_units(arms):
     members = MetricMembers(arms[0].task.mechanism)
     for name, unit, chosen in (("max(A1.rate)", "rad/s", "rpm"), ("rms(tau1.torque * 2)", "N m", "N mm")):
@@ -272,3 +294,7 @@ def test_the_command_prints_and_keeps_metrics(tmp_path):
     assert bad.returncode == 2
     assert "error: --metric: no such quantity (got 'A1.rat'); did you mean \"A1.rate\"?" in bad.stderr
     assert not (tmp_path / "other").exists()
+    cut = paraflex(*given, "--segments", "1", "--metric", "max(distal1.C.x)", "--mode", "++", "--force")
+    assert cut.returncode == 0, cut.stderr
+    (mode,) = json.loads(cut.stdout)["modes"].values()
+    assert mode["metrics"]["max(distal1.C.x)"]["unit"] == "m"

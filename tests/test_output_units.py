@@ -12,9 +12,12 @@ import xarray as xr
 
 import paraflex as pf
 from paraflex import plots
+from paraflex.cli.tables import in_own_units
 from paraflex.designs.units import unit_of
 from paraflex.errors import InputError
 from paraflex.figures.charts import Axis, Chart, Curve
+from paraflex.figures.kinematics import kinematics_tables
+from paraflex.figures.loads import joint_tables
 from paraflex.figures.tables import Column
 from paraflex.files import load_data
 from paraflex.formatting import axis_unit, common_unit, display_unit, output_unit, output_units, prefer_units, quantity
@@ -22,6 +25,7 @@ from paraflex.reports import motion_page
 from paraflex.reports.page import render
 from paraflex.results import motion_dataset, save_results
 from paraflex.results.export import export
+from paraflex.results.loads import load_figures
 from paraflex.units import QUANTITIES, unit_named
 from shell import paraflex
 
@@ -174,8 +178,25 @@ values = ["6 mm", "7 mm"]
 ''')
     done = paraflex("sweep", study, "--output", tmp_path / "s", "--workers", "1")
     assert done.returncode == 0, done.stderr
-    page = (tmp_path / "s" / "report.html").read_text(encoding="utf-8")
-    assert "[kN]" in page
+    page = tmp_path / "s" / "report.html"
+    assert "[kN]" in page.read_text(encoding="utf-8")
+    # So has what is made of the folder later.
+    for given, wanted in (((), "kN"), (("--units", "N"), "N")):
+        drawn = ("plot", tmp_path / "s", "response_curves", "--format", "svg", "--svg-text")
+        for command in (("report", tmp_path / "s"), drawn, ("export", tmp_path / "s", "--to", "csv")):
+            made = paraflex(*command, *given, "--force")
+            assert made.returncode == 0, made.stderr
+        figures = "".join(file.read_text(encoding="utf-8") for file in (tmp_path / "s" / "figures").glob("*.svg"))
+        heads = pd.read_csv(tmp_path / "s" / "export" / "results.csv").columns
+        for text in (page.read_text(encoding="utf-8"), figures, " ".join(heads)):
+            assert f"[{wanted}]" in text
+            assert f"[{'kN' if wanted == 'N' else 'N'}]" not in text
+
+
+def test_plain_numbers_have_the_units_of_the_model_in_their_parameters():
+    with output_units([]):
+        in_own_units({"parameters": {"model": {"units": {"length": "cm"}}}})
+        assert display_unit("m", 1.0).name == "cm"
 
 
 def test_a_model_keeps_its_units_when_it_is_saved(model, tmp_path):
@@ -242,3 +263,20 @@ def test_a_parameter_has_the_unit_of_the_fields_that_are_it():
         "joint": {"rod": ["a.rod", "rod"]},
     }
     assert unit_of(data, ("parameters", "rod")) == unit_of(data, ("parameters", "l")) == ""
+
+
+def test_ranges_have_the_unit_of_the_largest_end_however_near_zero_the_smallest_is():
+    """A sample that comes close to zero, by rounding or by chance, does not change the unit of a column."""
+    data = motion_dataset(pf.kinematics(pf.load("raparm_i"), samples=3))
+    first = data["point_position"].transpose("point", "axis", "time")[0, 0]
+    data["point_position"] = data["point_position"].where(
+        (data["point"] != first["point"]) | (data["axis"] != "x") | (data["time"] > 0.0), 3e-8
+    )
+    (points,) = (table for table in kinematics_tables(data) if table.title == "Points")
+    assert {unit for _, unit in points.heads()[1:5]} == {"mm"}
+    loads = load_figures(data)
+    for one in loads["joints"].values():
+        one.update(least=3e-8, most=0.3)
+    turning = next(joint_tables(loads))
+    assert turning.heads()[1:3] == [("from", "rad"), ("to", "rad")]
+    assert turning.texts()[0][1:3] == ["3e-08", "0.3"]

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 import scipy.linalg
 
+import paraflex as pf
 import twins
 from conftest import make_five_bar
 from paraflex.dynamics import build_system, consistent_state
@@ -26,6 +27,7 @@ from paraflex.mechanism import (
     finite_segments,
     proportional_segments,
     raparm_i,
+    with_clamps,
 )
 from paraflex.paths import Line
 from paraflex.results import tracking_dataset
@@ -101,6 +103,34 @@ def test_segments_converge_with_the_first_power():
     errors = np.array([first_frequency(n) for n in (8, 16, 32)]) / 1.8751040687119611**2 - 1.0
     assert 0.0 < errors[-1] < 0.1
     np.testing.assert_allclose(np.log2(errors[:-1] / errors[1:]), 1.0, atol=0.15)
+
+
+@pytest.mark.parametrize("n", [2, 8, 16])
+def test_a_clamped_link_lacks_the_bending_of_half_a_segment(n):
+    """Under a force at its tip it deflects by sum h (j h)^2 / E I over its hinges, for F L^3 / 3 E I of the beam.
+
+    With the bending up to the clamp the first hinge counts for one and a half.
+    """
+    root, straight = RevoluteJoint("root", "ground.O", "beam.O"), Assembly("straight", {"beam": 0.0})
+    whole = Mechanism("arm", {"O": (0.0, 0.0)}, (UNIFORM,), (root,), assemblies=(straight,))
+    force = 1e-4
+    lacking = finite_segments(whole, n).mechanism
+    for cut, more in ((lacking, 0.0), (with_clamps(lacking, ["root"]), 1.5 * (n - 1) ** 2 / n**3)):
+        found = pf.statics(cut, loads={f"beam_{n}.P.y": force}, held=["root"], steps=1, warning=False)
+        part = 3.0 * found.travel(f"beam_{n}.P.y")[-1] / force
+        assert part == pytest.approx((n - 1) * (2 * n - 1) / (2.0 * n**2) + more, rel=1e-6)
+
+
+def test_a_clamp_within_a_beam_parts_the_bending_at_its_point():
+    """At the middle of one of three segments nothing changes; nearer to a hinge, that one is stiffer."""
+    beam = dataclasses.replace(UNIFORM, points={"O": 0.0, "M": 0.5, "Q": 0.4, "P": 1.0})
+    straight = Assembly("straight", {"beam": 0.0})
+    for point, wanted in (("M", [3.0, 3.0]), ("Q", [1.0 / (1.0 / 3.0 - 0.1), 1.0 / (1.0 / 3.0 + 0.1)])):
+        root = RevoluteJoint("root", PointRef("ground", "O"), PointRef("beam", point))
+        whole = Mechanism("arm", {"O": (0.0, 0.0)}, (beam,), (root,), assemblies=(straight,))
+        found = with_clamps(finite_segments(whole, 3).mechanism, ["root"])
+        np.testing.assert_allclose([one.stiffness for one in found.springs], wanted, rtol=1e-12)
+        assert with_clamps(whole, ["root"]) is whole
 
 
 @pytest.mark.parametrize(

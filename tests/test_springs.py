@@ -147,11 +147,13 @@ def test_springs_are_no_constraints():
     ("spring", "says"),
     [
         (TorsionalSpring("s", "pinn", 1.0), "spring.s.joint: unknown joint"),
-        (TorsionalSpring("s", "pin", 0.0), "spring.s.stiffness: must be positive"),
+        (TorsionalSpring("s", "pin", -1.0), "spring.s.stiffness: must not be negative"),
         (TorsionalSpring("s", "pin", 1.0, np.nan), "spring.s.rest: "),
     ],
 )
 def test_a_spring_that_makes_no_sense(spring, says):
+    with pytest.raises(InputError, match=r"^spring\.s: gives no torque"):
+        TorsionalSpring("s", "pin")
     with pytest.raises(InputError) as caught:
         dataclasses.replace(pendulum(1.0), springs=(spring,))
     assert says in str(caught.value)

@@ -9,6 +9,7 @@ import pytest
 
 import paraflex as pf
 from flexures import EI, LENGTH, truss
+from paraflex.reports.provenance import command_line
 from paraflex.results import load_results, statics_summary
 from shell import paraflex
 
@@ -43,6 +44,27 @@ def test_a_guide_is_pushed_and_written_as_python_does_it(guide):
     again = paraflex("plot", "guide", "stiffness_travel", "--out", "again", cwd=folder)
     assert again.returncode == 0, again.stderr
     assert list((folder / "again").glob("stiffness_travel*"))
+
+
+def test_metrics_are_printed_and_kept(tmp_path):
+    asked = ("--metric", "max(abs(stage.T.y))", "--metric", "last(stage.A.x - 1 mm)", "--metric", "frequency")
+    given = ("statics", "leaf_spring_guide", "--steps", "2", "--out", "g", "--no-figures", "--no-report")
+    done = paraflex(*given, *asked, "--units", "mm", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    found = pf.statics(pf.load("leaf_spring_guide"), steps=2)
+    sunk, held = abs(found.travel("stage.T.y")[-1]), found.frequencies[-1, 0] / (2.0 * math.pi)
+    kept = json.loads((tmp_path / "g" / "statics.json").read_text())["metrics"]
+    assert {name: one["unit"] for name, one in kept.items()} == dict(zip(asked[1::2], ("m", "m", "Hz"), strict=True))
+    assert [one["value"] for one in kept.values()] == pytest.approx([sunk, 9e-3, held], rel=1e-6)
+    assert f"max(abs(stage.T.y)): {1e3 * sunk:.4g} mm" in done.stdout
+    bad = paraflex(*given, "--force", "--metric", "max(stage.T.y + 1)", cwd=tmp_path)
+    assert bad.returncode == 2
+    assert bad.stderr.splitlines()[-1].startswith(
+        "error: --metric: a sum of a quantity in m and a number without a unit"
+    )
+    assert json.loads((tmp_path / "g" / "statics.json").read_text())["metrics"] == kept
+    asked = json.loads(load_results(tmp_path / "g" / "statics.nc").attrs["parameters"])["run"]
+    assert "--metric frequency" in command_line(asked)
 
 
 def test_films_of_equilibria_are_refused(guide):

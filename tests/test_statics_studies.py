@@ -15,6 +15,7 @@ import paraflex as pf
 from flexures import LENGTH, WIDTH, E
 from paraflex.designs.measure import measure
 from paraflex.designs.sweep import load_sweep
+from paraflex.errors import InputError
 from paraflex.files import library_text
 from paraflex.results.metrics import METRICS, STATICS, MetricMembers, metric_unit
 from shell import paraflex
@@ -195,6 +196,20 @@ def test_names_of_coordinates_need_no_quotes(tmp_path):
         "max(my-stage.T.y - my-stage.T.x) - 1 mm": np.max(y - x) - 1e-3,
     }  # fmt: skip
     assert measure(found, list(wanted)) == pytest.approx(wanted, rel=1e-12)
+
+
+def test_points_and_joints_are_changes_since_the_start_whether_they_are_named_coordinates_or_not():
+    crank = pf.load("slider_crank")
+    places = {"rail.travel": "rail", "A.angle": "A", "crank.A.y": "crank.A.y", "rod.B.x": "rod.B.x"}
+    given = {"moved": {"O": 0.1}, "steps": 2, "warning": False}
+    named = pf.statics(crank, **given, stiffness=list(places.values()))
+    for found in (named, pf.statics(crank, **given, stiffness=[])):
+        for quantity, coordinate in places.items():
+            (value,) = pf.metrics(found, [f"last({quantity})"]).values()
+            assert value == pytest.approx(named.travel(coordinate)[-1], rel=1e-9), quantity
+            assert abs(value) > 1e-4
+    with pytest.raises(InputError, match=r"unknown coordinate \(got 'A.rate'\)"):
+        pf.metrics(named, ["max(A.rate)"])
 
 
 def test_equilibria_have_loads_of_joints_and_stresses_of_beams():

@@ -41,7 +41,7 @@ from .findings import Finding, warn_of
 from .integrators import IntegrationOptions, Method, Solution, check_times, choose
 from .integrators.beam_ends import leave_beam
 from .integrators.between import SAMPLES
-from .mechanism import ActuationMode, Mechanism, Motor, finite_segments, parse_mode, standing
+from .mechanism import ActuationMode, Mechanism, Motor, finite_segments, parse_mode, standing, with_clamps
 from .mechanism.actuation_modes import followers
 from .mechanism.profiles import stops
 from .paths import ModelWithPaths, Path, RigidMotion, path_follower
@@ -478,8 +478,11 @@ def _follow(
             "motors that give torques cannot be locked where others follow the plan", field="study.after",
             value=task.after.value, remedy='write after = "free"',
         )  # fmt: skip
-    profiles = planned_profiles(task.plan, torques, [motor.joint for motor in motors])
-    held = held_joints(task.system, task.start, profiles)
+    joints = [motor.joint for motor in motors]
+    profiles = planned_profiles(task.plan, torques, joints)
+    # Motors that follow the plan clamp the links; finite segments bend up to them then.
+    system = task.system if task.whole is None else build_system(with_clamps(task.mechanism, joints))
+    held = held_joints(system, task.start, profiles)
     end, follow = float(task.motion.t[-1]), [motor in motors for motor in task.mechanism.motors]
     signals, knots = pack_signals(held.system.mechanism, torques.without(follow).signals, end)
     stops = np.unique(np.concatenate([path_stops(torques.knots, task.mechanism), knots]))

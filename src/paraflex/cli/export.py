@@ -20,6 +20,7 @@ def export_command(request: ExportRequest) -> None:
     table = results / _TABLE if results.is_dir() else results
     with flagged(request):
         if table.name.endswith(".parquet") and table.is_file():
+            in_own_units(None, table.parent)
             files = export_table(table, output, request.to, force=request.force)
         else:
             data = in_own_units(open_results(results))

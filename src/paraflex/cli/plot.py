@@ -22,7 +22,7 @@ def plot_command(request: PlotRequest) -> None:
     """Draw the requested figures and print their files, or list the available ones."""
     _check(request)
     source = open_source(request.results)
-    in_own_units(source.data)
+    in_own_units(source.data, source.folder)
     moved = request.over != TIME.name
     if request.only_list or not (request.figures or moved):
         _list(source, request.results)

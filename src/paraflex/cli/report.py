@@ -19,8 +19,7 @@ def report_command(request: ReportRequest) -> None:
         target = target / "report.html"
     if target.exists() and not request.force:
         raise InputError("already exists", field=str(target), remedy="give --force to overwrite it, or --output FILE")
-    if study is None:
-        in_own_units(open_results(file))
+    in_own_units(open_results(file) if study is None else None, study)
     console = PlainConsole(stderr=True)
     save_page(report(study or file, on_progress=console.print_lines), target)
     console.print_lines(f"report in {target}")

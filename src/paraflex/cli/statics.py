@@ -7,6 +7,7 @@ from functools import partial
 import numpy as np
 import xarray as xr
 
+from paraflex.designs.measure import metric_figures, metrics_of
 from paraflex.equilibria import StaticsDefaults, statics
 from paraflex.equilibria.conditions import coordinate_named
 from paraflex.errors import AssemblyError, EquilibriumError, InputError, renamed
@@ -14,12 +15,14 @@ from paraflex.figures import equilibria
 from paraflex.files import Model
 from paraflex.files.fields import number_in
 from paraflex.formatting import number, quantity
+from paraflex.results.metrics import STATICS, keep_metrics
 from paraflex.results.statics_data import statics_dataset, statics_summary
 from . import COMPLETE, FAILURE
 from .commands.models import StaticsRequest
 from .commands.requests import flagged
 from .ending import give_dataset
 from .request import command_provenance, naming_laws, of_assembly, requested_model
+from .run_lines import metric_lines
 from .tables import PlainConsole, print_tables
 
 
@@ -33,6 +36,8 @@ def statics_command(request: StaticsRequest) -> int:
 def _data(model: Model, request: StaticsRequest) -> xr.Dataset:
     """Return the equilibria, or those before the first that is not found."""
     requested = _requested(model, request)
+    with flagged(request, first=True):
+        metrics_of(request.metrics, model.study.error, runs=STATICS)
     with flagged(request, first=True), naming_laws(model):
         try:
             found = statics(
@@ -45,9 +50,13 @@ def _data(model: Model, request: StaticsRequest) -> xr.Dataset:
             found = error.partial
         except AssemblyError as error:
             raise of_assembly(error, model) from error
-    given = {name: value for name, value in (vars(requested) | {"assembly": request.assembly}).items()
-             if value is not None and value != {}}  # fmt: skip
-    return statics_dataset(found, parameters=command_provenance(model, {"statics": True} | given))
+        figures = metric_figures(found, request.metrics)
+    given = vars(requested) | {"metrics": request.metrics or None, "assembly": request.assembly}
+    given = {name: value for name, value in given.items() if value is not None and value != {}}
+    data = statics_dataset(found, parameters=command_provenance(model, {"statics": True} | given))
+    if figures:
+        keep_metrics(data, {"": figures})
+    return data
 
 
 def _requested(model: Model, request: StaticsRequest) -> StaticsDefaults:
@@ -125,6 +134,7 @@ def _lines(data: xr.Dataset, summary: dict) -> list[str]:
         )
     if data.sizes["step"] > 1 and summary["validity"] is not None and summary["validity"]["holds"]:
         lines.append(f"validity: {summary['validity']['verdict']}")
+    lines += metric_lines({"": summary})
     if summary["status"] != "complete":
         lines.append(f"error: {summary['message']}")
     return lines

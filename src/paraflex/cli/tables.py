@@ -6,6 +6,7 @@ import json
 import textwrap
 from collections.abc import Container, Iterable, Iterator, Sequence
 from contextlib import suppress
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from rich import box
@@ -26,10 +27,19 @@ if TYPE_CHECKING:
 _BETWEEN, _HEAD, _WRAPPED = 2, 9, 26
 
 
-def in_own_units(data: Any) -> Any:
-    """Return results, to be shown in the units of the [units] of their model's file unless others are chosen."""
+def in_own_units(data: Any, folder: Path | None = None) -> Any:
+    """Return results, to be shown in the units of the [units] of their model's file unless others are chosen.
+
+    The model is part of a dataset or of plain numbers; that of a study of many designs is in its folder.
+    """
+    from paraflex.campaign import STUDY, read_study  # imports xarray
+
     with suppress(AttributeError, KeyError, TypeError, ValueError):
-        prefer_units(json.loads(data.attrs["parameters"])["model"]["units"])
+        if folder is not None and (folder / STUDY).is_file():
+            model = read_study(folder / STUDY)["study"]["mechanism"]
+        else:
+            model = (data["parameters"] if isinstance(data, dict) else json.loads(data.attrs["parameters"]))["model"]
+        prefer_units(model["units"])
     return data
 
 
@@ -104,8 +114,9 @@ def print_table(console: PlainConsole, shown: DescribedTable, title: str | None 
         heads = [[*textwrap.wrap(name, max(width, _HEAD), break_long_words=False, break_on_hyphens=False), below]
                  for width, (name, below) in zip(widths, heads, strict=True)]  # fmt: skip
     widths = [max(width, *map(len, head)) + _BETWEEN for width, head in zip(widths, heads, strict=True)]
-    first = sum(min(width, _WRAPPED) for width in widths[:names])
-    for k, part in enumerate(_fitting(widths, names, console.width - first)):
+    # Columns of words may be broken.
+    least = [width if of_numbers else min(width, _WRAPPED) for width, of_numbers in zip(widths, numeric, strict=True)]
+    for k, part in enumerate(_fitting(least, names, console.width - sum(least[:names]))):
         kept = [*range(names), *part]
         most = max(len(list(filter(None, heads[c]))) for c in kept)
         table = plain_table()

@@ -148,7 +148,7 @@ def metric_columns(run: Runs, names: Sequence[str]) -> tuple[str, ...]:
 def _members(run: Runs) -> MetricMembers:
     if isinstance(run, Statics):
         return MetricMembers(run.system.described, run.equations.conditions)
-    return MetricMembers(run.system.described if isinstance(run, MotionRun) else run.task.mechanism)
+    return MetricMembers(run.system.mechanism if isinstance(run, MotionRun) else run.task.mechanism)
 
 
 def metric_values(traces: RunsTraces, nominal: RunsTraces, names: Sequence[str]) -> NDArray[Any]:

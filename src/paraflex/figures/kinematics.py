@@ -95,10 +95,12 @@ def _joints(data: xr.Dataset, found: Found, title: str, unit: str) -> Table:
         ends = [(0.0 if abs(value) < _SAME * np.ptp(values) else value, at) for value, at in ends]
         rows.append((joint, *min(ends), *max(ends), found["time_ratios"].get(joint)))
     columns = list(zip(*rows, strict=True)) if rows else [()] * 6
-    at = f"at {where}"
+    at, shown = f"at {where}", display_unit(unit, [*columns[1], *columns[3]])
     return Table(title, [
-        Column("joint", columns[0]), Column("lowest", columns[1], unit), Column(at, columns[2], place_unit),
-        Column("highest", columns[3], unit), Column(at, columns[4], place_unit), Column("time ratio", columns[5]),
+        Column("joint", columns[0]),
+        Column("lowest", columns[1], unit, shown=shown), Column(at, columns[2], place_unit),
+        Column("highest", columns[3], unit, shown=shown), Column(at, columns[4], place_unit),
+        Column("time ratio", columns[5]),
     ]).filled()  # fmt: skip
 
 
@@ -144,11 +146,12 @@ def _points(data: xr.Dataset) -> Table:
             rows.append((point, *ends.ravel().tolist(), *most))
             seen.append(places)
     columns = list(zip(*rows, strict=True)) if rows else [()] * 7
-    heads = [("x from", "m"), ("x to", "m"), ("y from", "m"), ("y to", "m"), ("top speed", "m/s"),
-             ("top acceleration", "m/s^2")]  # fmt: skip
+    # An end of a range may be as close to zero as the samples happen to come.
+    shown = display_unit("m", [end for ends in columns[1:5] for end in ends])
     return Table("Points", [
         Column("point", columns[0]),
-        *(Column(name, cells, unit) for (name, unit), cells in zip(heads, columns[1:], strict=True)),
+        *(Column(name, columns[k], "m", shown=shown) for k, name in enumerate(("x from", "x to", "y from", "y to"), 1)),
+        Column("top speed", columns[5], "m/s"), Column("top acceleration", columns[6], "m/s^2"),
     ], note="Ranges, and the largest speed and acceleration, at the samples.")  # fmt: skip
 
 
@@ -162,9 +165,11 @@ def _special(found: Found) -> Table:
         for point, trail in found["trails"].items() for kind in ("cusp", "crunode") for each in trail[f"{kind}s"]
     ]  # fmt: skip
     columns = list(zip(*rows, strict=True)) if rows else [()] * 6
+    shown = display_unit("m", [*columns[2], *columns[3]])
     return Table("Special points of coupler curves", [
-        Column("point", columns[0]), Column("kind", columns[1]), Column("x", columns[2], "m"),
-        Column("y", columns[3], "m"), Column(f"at {where}", columns[4], unit), Column("and at", columns[5], unit),
+        Column("point", columns[0]), Column("kind", columns[1]),
+        Column("x", columns[2], "m", shown=shown), Column("y", columns[3], "m", shown=shown),
+        Column(f"at {where}", columns[4], unit), Column("and at", columns[5], unit),
     ]).filled()  # fmt: skip
 
 

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import xarray as xr
 
-from paraflex.formatting import NO_VALUE, common_unit, number, peak, text_symbol
+from paraflex.formatting import NO_VALUE, display_unit, number, peak, text_symbol
 from paraflex.results.beam_stresses import CONTACT, stresses_of
 from paraflex.results.kinematics import KINEMATICS, RIGID_TORQUES
 from paraflex.results.loads import resolved_error, sliding_joints
@@ -256,7 +256,7 @@ def joint_tables(loads: Mapping[str, Any]) -> Iterator[Table]:
     for unit, what, word in (("rad", "Joints that turn", "angle"), ("m", "Joints that slide", "travel")):
         own = {name: one for name, one in joints.items() if one["unit"] == unit}
         rows = list(own.values())
-        shown = common_unit(unit, [one[key] for one in rows for key in ("least", "most")])
+        shown = display_unit(unit, [one[key] for one in rows for key in ("least", "most")])
         note = f"{what}. From and to: {word}; largest magnitudes and their times."
         if any(resolved_error(one, key) for one in rows for key in ("force", "moment")):
             note += _ERRORS

@@ -254,9 +254,10 @@ def _member(group: Group, name: str, entry: Any, table: ModelTable) -> Any:
         with within(f"load.{name}"):
             given = read_components(entry, entry.type, evaluate_parameters(table.parameters), table.study.duration)
         return kind(name, entry.point, given[0] if entry.type == "torque" else given, reaction=entry.reaction)
-    if values.get("force") is not None:
-        with within(f"{group.table}.{name}"):
-            values["force"] = ForceLaw(str(values["force"]), evaluate_parameters(table.parameters))
+    for field in ("force", "torque"):
+        if values.get(field) is not None:
+            with within(f"{group.table}.{name}"):
+                values[field] = ForceLaw(str(values[field]), evaluate_parameters(table.parameters), field=field)
     points = [PointRef.parse(point, f"{group.table}.{name}.points") for point in values.pop("points", ())]
     return kind(name, *points, *values.pop("joints", ()), **values)
 

@@ -87,6 +87,7 @@ from .segments import (
     in_frames as in_frames,
     is_hinge as is_hinge,
     proportional_segments as proportional_segments,
+    with_clamps as with_clamps,
 )
 from .sensors import (
     SENSOR_KINDS as SENSOR_KINDS,

@@ -159,6 +159,7 @@ def check_loads(mechanism: Members) -> None:
             _check_points_of(mechanism, group, member)
     places = [(f"load.{load.name}", law) for load in mechanism.loads for law in load.laws]
     places += [(f"linear_spring.{one.name}", law) for one in mechanism.linear_springs for law in one.laws]
+    places += [(f"spring.{one.name}", one.torque) for one in mechanism.springs if one.torque is not None]
     for place, law in places:
         for quantity in law.quantities.values():
             _check_quantity(mechanism, quantity, f"{place}.{law.field}")

@@ -98,7 +98,7 @@ class ForceLaw(CheckedFields):
             names = names_in(self.text)
         used = {name: value for name, value in self.parameters.items() if name in names}
         object.__setattr__(self, "parameters", used)
-        if not self.quantities:
+        if not self.quantities and self.table is not None:
             raise InputError(
                 "contains no joint and no point", field=self.field, value=self.text,
                 remedy="name one, say slider.travel, stage.T.y or spring.length",
@@ -127,6 +127,12 @@ class ForceLaw(CheckedFields):
     def in_time(self) -> bool:
         """Whether the expression contains the time."""
         return any(one.name == TIME for one in self.operations)
+
+    def scaled(self, factor: float) -> "ForceLaw":
+        """Return the law times a number."""
+        if self.table is None:
+            return self if factor == 1.0 else replace(self, text=f"{factor!r} * ({self.text})")
+        return replace(self, table=replace(self.table, values=tuple(factor * value for value in self.table.values)))
 
     def moved(self, points: Mapping[PointRef, PointRef]) -> "ForceLaw":
         """Return the law with points replaced by others, where `points` has them."""

@@ -17,18 +17,41 @@ from .quantities import AT_JOINT, field_metadata, finite, not_negative, optional
 
 @dataclass(frozen=True)
 class TorsionalSpring(CheckedFields):
-    """Linear spring at a joint: torque -stiffness (joint angle - rest) on body b, the angle being that of b less a.
+    """Spring at a joint: torque -stiffness (joint angle - rest) on body b, the angle being that of b less a.
 
     The spring acts on the material at the joint, as a motor does. Stiffness in N m/rad, rest in rad, or N/m and m at a
-    joint that slides.
+    joint that slides. A mechanism holds a law of a spring as a load of the same name, with the opposite on body a.
+
+    Attributes
+    ----------
+    name : str
+        Name of the spring.
+    joint : str
+        Name of the joint.
+    stiffness : float
+        Stiffness [N m/rad or N/m]; 0 by default.
+    rest : float
+        Angle [rad] or travel [m] at which the spring is free; 0 by default.
+    torque : ForceLaw, optional
+        Characteristic of the spring, an additional torque [N m] or force [N] on body b, such as "-k * JOINT.angle**3".
+        A joint that slides has to slide on the ground.
     """
 
     _table = "spring"
 
     name: str
     joint: str = field(metadata=AT_JOINT)
-    stiffness: float = field(metadata=field_metadata("the stiffness in N m/rad", positive, "N m/rad, or N/m"))
+    stiffness: float = optional(0.0, "the stiffness in N m/rad", not_negative, "N m/rad, or N/m")
     rest: float = optional(0.0, "the joint's angle at which the spring is free in rad", finite)
+    torque: ForceLaw | None = optional(
+        None, "the torque on the joint's second body in N m, an expression of its NAME.angle, NAME.rate and others"
+    )
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        if self.torque is None and not self.stiffness:
+            remedy = "give the stiffness in N m/rad, or N/m, or a torque"
+            raise InputError("gives no torque", field=f"spring.{self.name}", remedy=remedy)
 
 
 @dataclass(frozen=True)
@@ -94,7 +117,8 @@ class LinearSpring(CheckedFields):
     damping : float
         Damping coefficient [N s/m]; 0 by default.
     force : ForceLaw, optional
-        Characteristic of the spring, a tensile force [N] such as "k * (NAME.length - l0)**3", without the time.
+        Characteristic of the spring, a tensile force [N] such as "k * (NAME.length - l0)**3", without the time, or a
+        constant one.
     """
 
     _table = "linear_spring"

@@ -16,6 +16,7 @@ from .members import Geometry, Members
 from .payload import Payload, loaded, together
 from .phases import with_phases
 from .quantities import known
+from .spring_laws import with_spring_laws
 from .tracks import with_meshes
 
 
@@ -91,7 +92,7 @@ class Mechanism(Members, Shown):
         object.__setattr__(self, "bodies", with_meshes(self))
         # The checks have cached the bodies by name.
         self.__dict__.pop("_bodies_by_name", None)
-        for field, members in with_phases(self).items():
+        for field, members in (with_phases(self) | with_spring_laws(self)).items():
             object.__setattr__(self, field, members)
         self.__dict__.pop("joints_by_name", None)
 

@@ -5,7 +5,7 @@ deflections. Segments: the virtual prototype (section 6.1) that verifies the bea
 """
 
 from bisect import bisect_right
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from math import ceil
@@ -135,6 +135,37 @@ def finite_segments(mechanism: Mechanism, segments: int | Mapping[str, int] = 8)
         springs=(*mechanism.springs, *springs), dampers=(*mechanism.dampers, *dampers),
     )  # fmt: skip
     return SegmentedMechanism(segmented, carriers)
+
+
+def with_clamps(segmented: Mechanism, joints: Iterable[str]) -> Mechanism:
+    """Return finite segments whose beams bend up to the joints that hold them; other mechanisms are returned unchanged.
+
+    The spring of a hinge represents the bending between the centres of its segments. A joint that clamps a segment ends
+    that bending at its own point, so that the springs beside it have the bending up to there.
+    """
+    cut = segmented.cut
+    if cut is None:
+        return segmented
+    springs = {one.name: one for one in segmented.springs}
+    dampers = {one.name: one for one in segmented.dampers}
+    for ref in (ref for joint in map(segmented.joint, joints) for ref in (joint.a, joint.b)):
+        name, start = cut.carriers.get(ref.body, ("", 0.0))
+        parts = cut.parts.get(name, ())
+        if len(parts) < 2:
+            continue
+        beam, number = cut.whole.body(name), parts.index(ref.body)
+        centre, place = start + 0.5 * beam.length / len(parts), beam.points[ref.point]
+        pieces = _pieces(beam, *sorted((centre, place)))
+        bending = sum((b - a) / span.bending_stiffness for a, b, span in pieces) * (1.0 if place > centre else -1.0)
+        for hinge, more in (("-".join(parts[max(number - 1, 0) : number + 1]), bending),
+                            ("-".join(parts[number : number + 2]), -bending)):  # fmt: skip
+            if hinge not in springs:
+                continue
+            softer = 1.0 / (1.0 + more * springs[hinge].stiffness)
+            springs[hinge] = replace(springs[hinge], stiffness=softer * springs[hinge].stiffness)
+            if hinge in dampers:
+                dampers[hinge] = replace(dampers[hinge], coefficient=softer * dampers[hinge].coefficient)
+    return replace(segmented, springs=tuple(springs.values()), dampers=tuple(dampers.values()))
 
 
 def moved(member: T, points: Mapping[PointRef, PointRef]) -> T:

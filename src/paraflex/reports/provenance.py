@@ -28,7 +28,7 @@ _COMMANDS: Mapping[str, Sequence[str]] = {
         "automatic_gains", "rigid", "ked", "balanced", "geometry", "stop_at", "metrics",
     ),
     "verify": ("model", "path", "modes", "fidelities", "engines", *_PLAN, "tolerance", "method", "segments", *_FRAMES),
-    "statics": ("model", "loads", "torques", "moved", "held", "stiffness", "steps", "buckling", "assembly"),
+    "statics": ("model", "loads", "torques", "moved", "held", "stiffness", "steps", "buckling", "metrics", "assembly"),
     "kinematics": _DRIVEN,
     "torques": (*_DRIVEN, "mode", "fluctuation"),
     "linearise": _LINEAR,

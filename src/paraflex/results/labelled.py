@@ -111,13 +111,13 @@ _COMMENTS = {
     "motor_power": "torque or force times the rate of the joint: positive drives the mechanism, negative brakes it",
     "joint_force": (
         "at the joint's point of the second body, in the ground frame: of the constraints and of motors, springs, "
-        "dampers, friction, gears and prescribed motion along the joint; the opposite acts on the first body; NaN "
-        "where redundant constraints leave it undetermined"
+        "dampers, friction, gears and prescribed motion along the joint, without loads and laws of springs; the "
+        "opposite acts on the first body; NaN where redundant constraints leave it undetermined"
     ),
     "joint_moment": (
         "about the joint's point of the second body, positive anticlockwise: of the constraints and of motors, "
-        "springs, dampers, friction, gears and prescribed motion that turn the joint; the opposite acts on the first "
-        "body; NaN where redundant constraints leave it undetermined"
+        "springs, dampers, friction, gears and prescribed motion that turn the joint, without loads and laws of "
+        "springs; the opposite acts on the first body; NaN where redundant constraints leave it undetermined"
     ),
     "multiplier": (
         "on the left of the equations of motion: its negative acts on the joint's second body, in the ground frame, "

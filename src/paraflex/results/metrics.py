@@ -24,7 +24,7 @@ from paraflex.mechanism.quantities import known
 from paraflex.units import WHERE_IT_SLIDES
 from .formulas import drift_speed, largest_norm, overshoot, rms, settling_time, stress_at, vibration
 from .metric_expressions import MetricExpression, parsed
-from .motion_quantities import JOINT_LOADS, MOTOR_WORDS, Quantity, is_load, quantity_named
+from .motion_quantities import JOINT_LOADS, MOTOR_WORDS, Quantity, is_static, quantity_named
 from .traces import Trace
 
 if TYPE_CHECKING:
@@ -62,8 +62,9 @@ class MetricMembers(dict[str, Sequence[str]]):
             names = {kind: tuple(one.name for one in each) for kind, each in coordinates.items()}
             super().__init__(names | {sliding(kind): straight for kind in names})
             return
-        found = {MOTOR: mechanism.motors, DRIVE: mechanism.prescribed, JOINT: mechanism.joints}
-        slides = {joint.name for joint in mechanism.joints if joint.slides}
+        whole = mechanism.described
+        found = {MOTOR: whole.motors, DRIVE: whole.prescribed, JOINT: whole.joints}
+        slides = {joint.name for joint in whole.joints if joint.slides}
         super().__init__(
             {kind: tuple(one.name for one in each) for kind, each in found.items()}
             | {
@@ -84,7 +85,7 @@ class MetricMembers(dict[str, Sequence[str]]):
             return quantity_named(name, self.mechanism)
         trace, _, member = name.partition(".")
         if trace not in _OF_COORDINATES:
-            if name not in self[COORDINATE] and is_load(name):
+            if name not in self[COORDINATE] and is_static(name):
                 return quantity_named(name, self.mechanism)
             trace, member = _OF_COORDINATES[0], name
         metric = METRICS[trace]

@@ -47,13 +47,14 @@ class Quantity(NamedTuple):
 
 
 def quantity_named(name: str, mechanism: Mechanism) -> Quantity:
-    """Return a quantity of the runs of a mechanism by its name.
+    """Return a quantity of the runs of a mechanism by its name, of one with segments by the names of the whole beams.
 
     Raises
     ------
     InputError
         The mechanism has no such quantity.
     """
+    simulated, mechanism = mechanism, mechanism.described
     owner, _, word = name.rpartition(".")
     if name == _ERROR and mechanism.end_effector is not None:
         return Quantity("m", _error)
@@ -64,11 +65,11 @@ def quantity_named(name: str, mechanism: Mechanism) -> Quantity:
     if owner in mechanism.joints_by_name and word in _JOINT_WORDS:
         return _of_joint(name, owner, word, mechanism)
     if word in _BODY_WORDS and owner in [body.name for body in mechanism.bodies]:
-        return _of_body(name, owner, word, mechanism)
+        return _of_body(name, owner, word, simulated)
     if owner == _SENSOR:
-        for sensor in mechanism.sensors:
+        for sensor in simulated.sensors:
             if sensor.name == word:
-                return Quantity(mechanism.sensor_unit(sensor), partial(_reading, word))
+                return Quantity(simulated.sensor_unit(sensor), partial(_reading, word))
     if word in _POINT_WORDS and owner in _points(mechanism):
         unit, derivative, axis = _POINT_WORDS[word]
         point = PointRef.parse(owner, "metrics")
@@ -78,9 +79,9 @@ def quantity_named(name: str, mechanism: Mechanism) -> Quantity:
     raise InputError("no such quantity", field="metrics", value=name, remedy=suggestion(name, near or names))
 
 
-def is_load(name: str) -> bool:
-    """Check whether a quantity is a load or deformation, which equilibria have as well."""
-    return name.rpartition(".")[2] in (*JOINT_LOADS, *_BODY_WORDS)
+def is_static(name: str) -> bool:
+    """Check whether equilibria have a quantity as well: a load, a deformation or a coordinate."""
+    return name.rpartition(".")[2] in (*JOINT_LOADS, *_BODY_WORDS, "angle", "travel", "x", "y")
 
 
 def _names(mechanism: Mechanism) -> Iterator[str]:
@@ -154,7 +155,11 @@ def _of_joint(name: str, owner: str, word: str, mechanism: Mechanism) -> Quantit
 
 def _of_body(name: str, owner: str, word: str, mechanism: Mechanism) -> Quantity:
     """Return the largest deflection or stress of a flexible body at every sample, with the signs of the nominal run."""
-    body = mechanism.body(owner)
+    body, cut = mechanism.described.body(owner), mechanism.cut
+    parts = () if cut is None else cut.parts[owner]
+    if _bends(body) and parts and not any(_bends(mechanism.body(part)) for part in parts):
+        raise InputError(f"{owner} is cut into rigid segments, which have no {word}", field="metrics", value=name,
+                         remedy="name a point or a joint, or leave out the segments")  # fmt: skip
     if not _bends(body) or (word == "stress" and not isinstance(body, FlexibleBeam | AssumedModesBeam)):
         raise InputError("not a flexible beam" if word == "stress" else "not a flexible body", field="metrics",
                          value=name, remedy="name a beam that bends")  # fmt: skip

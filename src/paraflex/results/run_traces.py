@@ -232,6 +232,18 @@ class StaticsTraces(SolutionTraces[Statics]):
         """Conditions of the equilibria."""
         return self.run.equations.conditions
 
+    def joint_quantity(self, name: str, word: str) -> Trace:
+        """Return a load of a joint, or the change (k,) of its coordinate since the start; see the runs' method."""
+        found = super().joint_quantity(name, word)
+        start = self.run.equations.start.q[None]
+        return found - joint_coordinate(self.system, name, start).value if word in ("angle", "travel") else found
+
+    def point_motion(self, point: PointRef) -> PointMotion:
+        """Return the change of a point's position since the start as its position, at rest."""
+        found, start = super().point_motion(point), self.run.equations.start.q[None]
+        at_start = point_motion(self.system, point, start, 0.0 * start, 0.0 * start)
+        return found._replace(position=found.position - at_start.position)
+
     @property
     def torque(self) -> Trace:  # pyright: ignore[reportIncompatibleVariableOverride]
         """Zeros (k, motors): in statics motor torques are efforts at named coordinates."""

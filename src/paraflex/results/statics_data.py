@@ -16,6 +16,7 @@ from .findings import keep_findings, validity_summary, validity_variables, verdi
 from .kinds import check_kind
 from .labelled import label, link_coordinates, with_totals
 from .links import system_links
+from .metrics import kept_metrics
 from .numbers import by_label, finite_or_none, name_units, single, stacked
 from .run_traces import StaticsTraces
 from .statics_steps import NAMED_UNITS
@@ -225,6 +226,7 @@ def statics_summary(data: xr.Dataset) -> dict[str, Any]:
         **({"stress_max": by_label(data["stress_max"], "body")} if "stress_max" in data else {}),
         "verdict": verdict_of(data).to_dict(),
         "validity": validity_summary(data),
+        **kept_metrics(data),
         "parameters": json.loads(data.attrs["parameters"]),
         "version": data.attrs["paraflex_version"],
     }  # fmt: skip

@@ -143,6 +143,9 @@ class StaticsRequest:
         "Coordinate whose stiffness is computed; repeatable. Default: those loaded or moved, else the end-effector's.",
     )
     buckling: int | None = option("--buckling N", "Number of buckling factors about every equilibrium. Default: 1.")
+    metrics: list[str] = repeatable(
+        "--metric EXPRESSION", 'A number of all steps: a metric of studies, or "max(abs(stage.T.y))"; repeatable.'
+    )
     assembly: str | None = assembly_option()
     files: FilesChoice = field(default_factory=FilesChoice)
 
