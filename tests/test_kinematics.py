@@ -658,6 +658,7 @@ def test_the_commands_write_results_that_other_commands_take(rocker, tmp_path):
     ("words", "message"),
     [
         (["torques", "FILE", "--drive", "O"], r"body\.crank\.mass: is missing"),
+        (["statics", "FILE"], r"error: .*rocker\.toml: body\.crank\.mass: is missing"),
         (["run", "FILE", "--duration", "1"], r"body\.crank\.mass: is missing"),
         (["kinematics", "FILE"], "--drive: is missing; name the joint that drives the mechanism: O, A, B, Q"),
         (
@@ -679,6 +680,11 @@ def test_the_commands_write_results_that_other_commands_take(rocker, tmp_path):
         (["kinematics", "FILE", "--drive", "O", "--drive", "Q"], r"--drive: two joints move \(got 'O, Q'\); hold the"),
         (["kinematics", "FILE", "--drive", "O", "--drive", "Q=1 m"], "--drive: a quantity in m where one in rad is"),
         (["kinematics", "FILE", "--drive", "O", "--drive", "Q="], r"--drive: has no value \(got 'Q='\)"),
+        (["kinematics", "FILE", "-drive", "O"], r"error: -drive: one dash; did you mean --drive\?"),
+        (
+            ["torques", "FILE", "-d", "O"],
+            r"-d: no such option of paraflex torques; did you mean --drive or --duration\?",
+        ),
         (["kinematics", "FILE", "--drive", "O", "--from", "abc"], "--from: not a number"),
         (["torques", "five_bar", "--mode", "+-"], r'--mode: mode "\+-" cannot drive'),
         (["torques", "four_bar", "--mode", "++"], "--mode: has no effect without a path"),
@@ -691,6 +697,13 @@ def test_wrong_requests_are_answered_in_one_line(rocker, tmp_path, words, messag
     (line,) = done.stderr.strip().splitlines()
     assert re.search(message, line)
     assert not (tmp_path / "out").exists()
+
+
+def test_a_file_without_masses_is_named_and_a_model_that_is_not_named_is_told(rocker):
+    done = paraflex("info", rocker)
+    assert done.returncode == 2
+    assert done.stderr.startswith(f"error: {rocker}: body.crank.mass: is missing")
+    assert paraflex("modes").stderr == "no model is named: this is raparm_i\n"
 
 
 def test_points_that_pause_with_the_whole_mechanism_have_no_cusp():

@@ -119,9 +119,13 @@ def _usage(error: Any) -> InputError:
     option, alike = getattr(error, "option_name", ""), getattr(error, "possibilities", ())
     if option and hasattr(error, "possibilities"):
         others = [one.name for one in COMMANDS if option in flags_of(one.request)]
+        # "-d" has the letter of "--drive".
+        params = [] if error.ctx is None else error.ctx.command.params
+        alike = alike or [flag for one in params for flag in one.opts if flag.startswith(f"-{option}")]
         remedy = f"did you mean {' or '.join(sorted(alike))}?" if alike else "--help lists all"
         remedy = f"it is one of paraflex {listed(others, 3)}" if others else remedy
-        return InputError(f"no such option of paraflex {command}", field=option, remedy=_MEANT.get(option, remedy))
+        problem = f"no such option of paraflex {command}".strip()
+        return InputError(problem, field=option, remedy=_MEANT.get(option, remedy))
     if option:
         return InputError("has no value", field=option, remedy="write one behind it; --help describes it")
     if "extra argument" in text:

@@ -20,13 +20,15 @@ from . import COMPLETE
 from .commands.models import KinematicsRequest, TorquesRequest
 from .commands.requests import flagged, flags
 from .ending import give_dataset
-from .request import command_provenance, locating_errors, of_assembly, requested_model
+from .request import command_provenance, locating_errors, of_assembly, requested_model, without_model
 from .run_lines import load_lines
 from .tables import PlainConsole, print_tables
 
 
 def kinematics_command(request: KinematicsRequest) -> int:
     """Compute a driven motion, print it and, with --out, write files; return the exit code."""
+    if request.model.given is None:
+        return without_model("torques" if isinstance(request, TorquesRequest) else "kinematics")
     model = requested_model(request.model)
     give_dataset("motion", lambda: _data(model, request), _summary, _print, request.files)
     return COMPLETE

@@ -19,7 +19,7 @@ from . import COMPLETE, FAILURE
 from .commands.models import StaticsRequest
 from .commands.requests import flagged
 from .ending import give_dataset
-from .request import command_provenance, naming_laws, of_assembly, requested_model
+from .request import command_provenance, of_assembly, requested_model
 from .tables import PlainConsole, print_tables
 
 
@@ -33,7 +33,7 @@ def statics_command(request: StaticsRequest) -> int:
 def _data(model: Model, request: StaticsRequest) -> xr.Dataset:
     """Return the equilibria, or those before the first that is not found."""
     requested = _requested(model, request)
-    with flagged(request, first=True), naming_laws(model):
+    with flagged(request, first=True):
         try:
             found = statics(
                 model, **vars(requested), warning=False,

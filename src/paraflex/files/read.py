@@ -14,7 +14,7 @@ from pydantic import BaseModel, ValidationError
 from paraflex.errors import InputError, suggestion
 from paraflex.expressions.evaluate import evaluate_parameters
 from paraflex.limits import FILE_BYTES, KEY_PARTS, NAME_LETTERS
-from .fields import check_units, field_at
+from .fields import check_units, described, field_at
 
 # Patterns of numbers with a decimal comma, of unquoted values that TOML does not allow, and of strings and comments,
 # whose brackets are ignored.
@@ -218,7 +218,7 @@ def _first_problem(schema: type[BaseModel], data: dict[str, Any], error: Validat
     location = _fields(schema, data, problem)
     field = ".".join(str(part) for part in location)
     place = field_at(schema, data, location)
-    model, description = place.owner, place.description
+    model, description = place.owner, described(place, data, location)
     kind, value = problem["type"], problem.get("input")
     if kind == "missing":
         return InputError("is missing", field=field, remedy=f"give {description}")
