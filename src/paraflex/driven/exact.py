@@ -126,11 +126,11 @@ def follow_past(
         count = int(np.searchsorted(t, singular - beside, side="right"))
         start, begun = (float(t[count - 1]), found.arrays[1][count - 1]) if count else (float(grid[0]), pose)
         # Motions along paths end at singular positions of their own kind.
-        if found.closed or loops.coordinates.size or start > singular - beside or len(passed) == _MOST_PASSED:
+        if found.closed or loops.coordinates.size or len(passed) == _MOST_PASSED:
             break
         ends = (singular - beside, singular + beside)
         before = state_at(loops, target, start, begun, ends[0])
-        after = _continued(loops, before, ends)
+        after = _continued(loops, before, ends) if before.q.size else None
         if after is None:
             break
         inside = grid[keep & (grid > ends[0]) & (grid <= ends[1])]

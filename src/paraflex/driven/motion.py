@@ -232,7 +232,7 @@ def _ranged(
     near, closed = poses
     fixed = wish.end is not None or wish.duration is not None
     try:
-        return *ranged(mechanism, law, near, freedoms, fixed=fixed), ""
+        return *ranged(mechanism, law, near, freedoms, system, fixed=fixed), ""
     except UnreachablePathError:
         raise
     except AssemblyError as error:
@@ -243,7 +243,7 @@ def _ranged(
     # The assembly's angle of the drive is approximate: another joint's may be nearer.
     again = chosen_drive(mechanism, wish, freedoms, system, closed)
     assert again is not None
-    return *ranged(mechanism, again, closed, freedoms, fixed=fixed), f"at {value_text(system, law.joint, closed)}"
+    return *ranged(mechanism, again, closed, freedoms, system, fixed=fixed), f"at {value_text(system, law.joint, closed)}"
 
 
 def _path(

@@ -12,7 +12,7 @@ from paraflex.dynamics import System, assembled_position
 from paraflex.dynamics.joint_coordinates import joint_value, value_text
 from paraflex.dynamics.soundness import mobility
 from paraflex.dynamics.state import State
-from paraflex.errors import InputError, Moment, UnreachablePathError, listed
+from paraflex.errors import AssemblyError, InputError, Moment, UnreachablePathError, listed
 from paraflex.formatting import quantity
 from paraflex.mechanism import Assembly, ConstantSpeed, Mechanism, PrescribedAngle
 from paraflex.mechanism.quantities import finite, known
@@ -203,10 +203,18 @@ def _with_drive(mechanism: Mechanism, law: Drive, freedoms: int) -> Mechanism:
 
 
 def ranged(
-    mechanism: Mechanism, law: Drive, pose: Array, freedoms: int, *, fixed: bool
+    mechanism: Mechanism, law: Drive, pose: Array, freedoms: int, system: System, *, fixed: bool
 ) -> tuple[LoopClosure, Array, Drive]:
     """Return closure, first pose and drive; without a given end the range is a turn or lies between two limits."""
-    loops, pose = driven_loops(_with_drive(mechanism, law, freedoms), pose, law.duration, freedoms)
+    way = replace(law, start=joint_value(system, law.joint, pose), end=law.start)
+    try:
+        loops, pose = driven_loops(_with_drive(mechanism, law, freedoms), pose, law.duration, freedoms)
+    except AssemblyError:
+        if way.start == way.end:
+            raise
+        # A start beyond a change point is reached along the motion from the assembly.
+        there, pose = driven_loops(_with_drive(mechanism, way, freedoms), pose, way.duration, freedoms)
+        loops, pose = _closure(mechanism, law, freedoms), _last_pose(there, way, pose)
     if fixed or (stopped := _reached(loops, law, pose)) is None:
         if not fixed and law.unit == "m":
             raise InputError(
@@ -224,12 +232,15 @@ def ranged(
     low, high = sorted(ends)
     reach, inside = (low, high), _MARGIN * (high - low)
     span = (low + inside, high - inside) if law.end > law.start else (high - inside, low + inside)
-    back = replace(law, end=span[0])
     if span[0] != law.start:
-        there = _closure(mechanism, back, freedoms)
-        pose = followed(there, np.array([0.0, back.duration]), pose, back)[0][1][-1]
+        back = replace(law, end=span[0])
+        pose = _last_pose(_closure(mechanism, back, freedoms), back, pose)
     law = replace(law, start=span[0], end=span[1], reach=reach)
     return _closure(mechanism, law, freedoms), pose, law
+
+
+def _last_pose(loops: LoopClosure, law: Drive, pose: Array) -> Array:
+    return followed(loops, np.array([0.0, law.duration]), pose, law)[0][1][-1]
 
 
 def _closure(mechanism: Mechanism, law: Drive, freedoms: int) -> LoopClosure:
