@@ -485,6 +485,45 @@ def test_a_motion_that_starts_at_a_change_point_is_refused():
         pf.kinematics(PARALLELOGRAM, "O", start=math.pi)
 
 
+def angles_of(motion):
+    data = pf.motion_dataset(motion)
+    return [data["angle"].sel(body=body).values for body in ("crank", "coupler", "rocker")]
+
+
+@pytest.mark.parametrize("beside", [-0.4, -0.01, -0.001, 0.1, 0.6])
+def test_a_motion_starts_beside_a_change_point_or_beyond_one(beside):
+    start = math.pi + math.radians(beside)
+    motion = pf.kinematics(PARALLELOGRAM, "O", start=start, end=math.pi + 0.3, samples=31)
+    crank, coupler, rocker = angles_of(motion)
+    assert np.max(np.abs(coupler)) < 1e-10
+    assert np.max(np.abs(rocker - crank)) < 1e-10
+    assert [motion.drive.at(t) for t in motion.passed] == pytest.approx([math.pi] if beside < 0.0 else [], abs=1e-6)
+    # Backwards, the motion ends where it started.
+    back = pf.kinematics(PARALLELOGRAM, "O", start=math.pi + 0.3, end=start, samples=31)
+    assert np.max(np.abs(angles_of(back)[2][::-1] - rocker)) < 1e-10
+
+
+@pytest.mark.parametrize("beside", [-0.1, 0.2])
+def test_a_crossed_parallelogram_starts_crossed_beside_a_change_point(beside):
+    start = math.pi + math.radians(beside)
+    crank, _, rocker = angles_of(
+        pf.kinematics(PARALLELOGRAM, "O", start=start, end=math.pi + 0.3, samples=31, assembly="crossed")
+    )
+    usual = np.abs(crank - math.pi) > 0.02
+    ratio = np.tan(crank / 2.0) / np.tan(rocker / 2.0)
+    assert ratio[usual] == pytest.approx(-(0.4 - 0.1) / (0.4 + 0.1), abs=1e-9)
+
+
+def test_a_motion_by_a_table_starts_beside_a_change_point():
+    angles = {"crank": math.radians(179.9), "coupler": 0.0, "rocker": math.radians(179.9)}
+    near = replace(PARALLELOGRAM, assemblies=(pf.Assembly("open", angles),))
+    t = np.linspace(0.0, 1.0, 11)
+    table = pf.TabulatedProfile(tuple(t), tuple(math.radians(179.9) + 0.3 * t))
+    motion = pf.kinematics(replace(near, prescribed=(pf.PrescribedAngle("O", "O", table),)), duration=1.0, samples=31)
+    assert np.max(np.abs(angles_of(motion)[1])) < 1e-11
+    assert motion.passed == pytest.approx([math.radians(0.1) / 0.3], abs=1e-6)
+
+
 def bar(name, a, b, length):
     return pf.RigidBody(
         name, mass=1.0, inertia=length**2 / 12, points={a: (0.0, 0.0), b: (length, 0.0)},
@@ -514,6 +553,48 @@ def picker(links=3):
         motors=(pf.Motor("m1", "O1"), pf.Motor("m2", "C1")), gravity=(0.0, -9.81),
         end_effector=pf.EndEffector(pf.PointRef("plate", "P"), ("x", "y")), assemblies=(pf.Assembly("a", angles),),
     )  # fmt: skip
+
+
+@pytest.mark.parametrize("beyond", [-1e-6, -1e-7, -1e-12, 0.0, 1e-10])
+@pytest.mark.parametrize("speed", [0.1, 1.0])
+def test_a_motion_ends_at_a_change_point(beyond, speed):
+    """The loops may close there, with accelerations that are rounding errors over the distance."""
+    motion = pf.torques(HEAVY, "O", start=math.pi - 0.3, end=math.pi + beyond, samples=31, speed=speed)
+    data = pf.motion_dataset(motion).isel(time=-1)
+    assert np.max(np.abs(data["angular_acceleration"])) < 1e-7 * speed**2
+    assert data["joint_force"].sel(joint="B").values == pytest.approx([-0.05 * speed**2, 0.0], abs=1e-6 * speed**2)
+
+
+HEAVY = replace(PARALLELOGRAM, bodies=tuple(bar(*one) for one in (
+    ("crank", "O", "A", 0.1), ("coupler", "A", "B", 0.4), ("rocker", "Q", "B", 0.1))))  # fmt: skip
+
+
+@pytest.mark.parametrize("half", [0.1, 0.005])
+def test_forces_at_a_change_point_are_the_limit_of_those_beside_it(half):
+    """The coupler's pins, which move alike, carry its inertia in equal parts: m r w^2 / 2 = 5 N, towards the pivots."""
+    span = {"start": math.pi - half, "end": math.pi + half, "speed": 10.0, "samples": 21}
+    motion = pf.torques(HEAVY, "O", **span)
+    at = pf.motion_dataset(motion).isel(time=10)
+    assert motion.drive.at(motion.solution.t[10]) == pytest.approx(math.pi, abs=1e-12)
+    within = 1e-7 if half > 0.02 else 3e-5
+    assert at["joint_force"].sel(joint="B").values == pytest.approx([-5.0, 0.0], abs=within)
+    assert float(at["drive_torque"].sel(drive="O")) == pytest.approx(0.0, abs=1e-7)
+    assert [one.code for one in motion.findings] == ["special-pose"]
+    # Weights do work on the motion of coupler and rocker that is free there. The drive does none, and has its torque.
+    motion = pf.torques(replace(HEAVY, gravity=(0.0, -9.81)), "O", **span)
+    at = pf.motion_dataset(motion).isel(time=10)
+    assert np.isnan(at["joint_force"].sel(joint="B", axis="x"))
+    # All weights sink by r cos(crank), or half of it: (1/2 + 1 + 1/2) m g r.
+    assert float(at["drive_torque"].sel(drive="O")) == pytest.approx(-2.0 * 9.81 * 0.1, rel=1e-7)
+    assert [one.code for one in motion.findings] == ["special-pose", "loads-unbounded"]
+    assert "forces in O, A, B, Q grow without bound towards O at 3.14159 rad" in motion.findings[-1].text
+
+
+def test_a_flywheel_takes_samples_at_change_points():
+    gravity = replace(HEAVY, gravity=(0.0, -9.81))
+    at, beside = (pf.torques(gravity, "O", start=math.radians(start), speed=10.0) for start in (30.0, 30.3))
+    assert np.isnan(at.solution.multipliers).any()
+    assert pf.flywheel(at, 0.05).inertia == pytest.approx(pf.flywheel(beside, 0.05).inertia, rel=1e-8)
 
 
 @pytest.mark.parametrize("links", [2, 3])

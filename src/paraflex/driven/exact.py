@@ -22,6 +22,8 @@ from paraflex.paths.loops import ClosedLoops, LoopClosure
 
 # Part of a turn or travel, on either side of a change point, over which a motion is interpolated.
 _BESIDE = 1.0 / 720.0
+# Part of this time within which a sample is at the change point.
+AT = 1e-3
 # Deviation beyond a change point from the motion before it, as a part of the move, on the same branch.
 _SAME_BRANCH = 0.05
 # Singular value of constraints that depend on others, relative to the largest, and accuracy of a change point.
@@ -226,5 +228,7 @@ class ExactMotion(Brief):
         # The motion does not start from samples near a change point.
         while k > 0 and any(abs(times[k] - one) <= beside for one in self.passed):
             k -= 1
-        given = np.array([times[k], t]), np.array([False, True])
+        # Where loops close in spite of a change point nearby, accelerations are rounding: the motion goes on beyond it.
+        beyond = [one + 2.0 * beside for one in self.passed if abs(one - t) <= beside]
+        given = np.array([times[k], t, *beyond]), np.array([False, True, *(False for _ in beyond)])
         return ExactState(*follow_past(self.loops, self.target, *given, self.solution.q[k], beside)[0].arrays[1:4])

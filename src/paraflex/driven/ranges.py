@@ -17,7 +17,7 @@ from paraflex.formatting import quantity
 from paraflex.mechanism import Assembly, ConstantSpeed, Mechanism, PrescribedAngle
 from paraflex.mechanism.quantities import finite, known
 from paraflex.paths.loops import LoopClosure, no_long_steps
-from .exact import NO_TASKS, Drive, follow_past, no_target, width_beside
+from .exact import AT, NO_TASKS, Drive, follow_past, no_target, width_beside
 from .limits import limit_of_reach
 
 # Fraction of the range between two limits of reach that is left out at either limit, where rates grow without bound.
@@ -30,6 +30,8 @@ _SLOWEST = 1e-12
 _MOST_TURNS = 20.0
 # Longest step of a drive as a fraction of a turn, or of its travel.
 _STEP = 1.0 / 360.0
+# Smallest singular value of the constraints, relative to the largest, at which a motion ends beside a change point.
+_NEAR = 1e-2
 _GIVE_RANGE = "give the start and end of its travel"
 
 
@@ -262,9 +264,17 @@ def followed(
     grid, keep = times, np.ones(times.size, dtype=bool)
     if law is not None:
         grid, keep = no_long_steps(times, _STEP * law.duration / max(law.turns, 1.0))
-    found, passed = follow_past(loops, no_target, grid, keep, pose, width_beside(law, float(times[-1])))
+    beside = width_beside(law, float(times[-1]))
+    found, passed = follow_past(loops, no_target, grid, keep, pose, beside)
     if not found.closed:
         raise _barred(law, loops, found.last, found.stopped)
+    sizes = np.linalg.svd(loops.system.dimensionless_jacobian(found.last), compute_uv=False)
+    if law is not None and sizes[-1] < _NEAR * sizes[0]:
+        # Accelerations at the end are rounding errors, unless the motion beyond a change point tells them.
+        beyond = np.append(grid, grid[-1] + 2.0 * beside), np.append(keep, False)
+        more, later = follow_past(loops, no_target, *beyond, pose, beside)
+        if more.closed:
+            found, passed = more, [t for t in later if t <= times[-1] + AT * beside]
     return found.arrays[:4], tuple(passed)
 
 
