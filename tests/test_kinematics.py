@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import scipy
 
 import paraflex as pf
 from paraflex.errors import InputError, UnreachablePathError
@@ -657,6 +658,30 @@ def test_a_model_with_a_path_follows_it_unless_a_drive_is_named():
     assert pf.kinematics(model, path="line", samples=5).path == "line"
 
 
+def test_two_cranks_of_a_five_bar_turn_together():
+    """Their drives do the work that the kinetic energy takes; mirrored, they move the point on the middle line."""
+    model = pf.load("five_bar")
+    motion = pf.torques(model, "A1", held={"A2": (0.9, 0.9 + 2.0 * math.pi)})
+    data = pf.motion_dataset(motion)
+    first, second = (data["joint_coordinate"].sel(joint=joint).values for joint in ("A1", "A2"))
+    assert second - first == pytest.approx(0.9 - 2.16, abs=1e-12)
+    assert motion.drive.full_turn
+    assert motion.features.time_ratios["B1"] == pytest.approx(motion.features.time_ratios["B2"], rel=1e-9)
+    power = (data["drive_torque"] * data["drive_speed"]).sum("drive").values
+    energy = data["kinetic_energy"].values
+    spline = scipy.interpolate.CubicSpline(motion.solution.t, energy, bc_type="periodic")
+    assert spline(motion.solution.t, 1) == pytest.approx(power, abs=1e-3 * np.max(np.abs(power)))
+    mirrored = pf.kinematics(model, "A1", start=2.16, end=2.0, held={"A2": (math.pi - 2.16, math.pi - 2.0)}, samples=5)
+    x = pf.motion_dataset(mirrored)["point_position"].sel(point="distal1.C", axis="x").values
+    assert x == pytest.approx(x[0], abs=1e-12)
+    for wrong, says in (((1.0, math.nan), "not a finite number"), ((1, 2, 3), "not a number or two numbers")):
+        with pytest.raises(InputError, match=rf"held\.A2: {says}"):
+            pf.kinematics(model, "A1", held={"A2": wrong})
+    slider = pf.load("slider_crank")
+    with pytest.raises(InputError, match="2 drives, where the mechanism has 1 degree of freedom"):
+        pf.kinematics(slider, "O", held={slider.mechanism.joints[-1].name: (0.1, 0.2)})
+
+
 def test_a_duration_gives_the_end_of_a_drive():
     motion = pf.kinematics(pf.load("four_bar"), "O", start=0.5, speed=2.0, duration=0.25)
     assert motion.drive.end == pytest.approx(1.0, abs=1e-15)
@@ -731,6 +756,9 @@ def test_the_commands_write_results_that_other_commands_take(rocker, tmp_path):
     assert all(one["force_max"] is None for one in summary["loads"]["joints"].values())
     assert summary["loads"]["drives"]["O"]["torque_max"] is None
     assert paraflex("plot", folder, "--out", tmp_path / "figures").returncode == 0
+    done = paraflex("kinematics", "five_bar", "--drive", "A1=2.16:2", "--drive", "A2=1:57.3 deg", "--samples", "5")
+    assert "A1 moves from 2.1600 rad to 2.0000 rad" in done.stdout
+    assert "A2 moves from 1.0000 rad to 1.0001 rad in the same time" in done.stdout
     done = paraflex("torques", "four_bar", "--speed", "100 rpm", "--drive", "O", "--fluctuation", "0.02")
     assert "flywheel for a fluctuation of 0.02: 0.0754 kg m^2" in done.stdout
 
@@ -758,7 +786,10 @@ def test_the_commands_write_results_that_other_commands_take(rocker, tmp_path):
         (["kinematics", "FILE", "--rpm", "60"], '--rpm: no such option of paraflex kinematics; write --speed "60 rpm"'),
         (["run", "FILE", "--drive", "O"], "--drive: no such option of paraflex run; it is one of paraflex kinematics"),
         (["kinematics", "FILE", "O"], r"kinematics: unexpected argument \(got 'O'\)"),
-        (["kinematics", "FILE", "--drive", "O", "--drive", "Q"], r"--drive: two joints move \(got 'O, Q'\); hold the"),
+        (
+            ["kinematics", "FILE", "--drive", "O", "--drive", "Q"],
+            r"--drive: two joints move \(got 'O, Q'\); hold the others, or give",
+        ),
         (["kinematics", "FILE", "--drive", "O", "--drive", "Q=1 m"], "--drive: a quantity in m where one in rad is"),
         (["kinematics", "FILE", "--drive", "O", "--drive", "Q="], r"--drive: has no value \(got 'Q='\)"),
         (["kinematics", "FILE", "-drive", "O"], r"error: -drive: one dash; did you mean --drive\?"),
@@ -767,6 +798,9 @@ def test_the_commands_write_results_that_other_commands_take(rocker, tmp_path):
             r"-d: no such option of paraflex torques; did you mean --drive or --duration\?",
         ),
         (["kinematics", "FILE", "--drive", "O", "--from", "abc"], "--from: not a number"),
+        (["kinematics", "five_bar", "--drive", "A1", "--drive", "A2=60 rpm"], 'has two, "A2=FIRST:LAST"'),
+        (["kinematics", "five_bar", "--drive", "A1", "--drive", "A1=3"], "--drive: one joint both moves and is held"),
+        (["kinematics", "five_bar", "--drive", "A1=2", "--drive", "A2=3"], "--drive: nothing moves where all"),
         (["torques", "five_bar", "--mode", "+-"], r'--mode: mode "\+-" cannot drive'),
         (["torques", "four_bar", "--mode", "++"], "--mode: has no effect without a path"),
     ],

@@ -31,6 +31,8 @@ _DEPENDENT = 1e-9
 # Change points that a motion may pass.
 _MOST_PASSED = 100
 Target = Callable[[Array], Array]
+# Values at which other joints are held, or between which they move [rad, m].
+Held = Mapping[str, float | tuple[float, float]]
 NO_TASKS = np.zeros(0, dtype=np.int64)
 
 
@@ -69,8 +71,9 @@ class Drive:
     reach : tuple of float or None
         Lowest and highest angle or travel that the mechanism allows in this assembly, None for those that do not lie
         in the range examined.
-    held : mapping of str to float
-        Other joints that are held, with their angles [rad] or travels [m].
+    held : mapping of str to float, or to a pair of float
+        Other joints that are held, with their angles [rad] or travels [m]; a pair is the first and last one of a joint
+        that moves in the same time, at constant speed.
     """
 
     name: str
@@ -80,7 +83,7 @@ class Drive:
     speed: float
     unit: str
     reach: tuple[float | None, float | None] = (None, None)
-    held: Mapping[str, float] = field(default_factory=dict)
+    held: Held = field(default_factory=dict)
 
     @property
     def turns(self) -> float:
@@ -90,7 +93,18 @@ class Drive:
     @property
     def full_turn(self) -> bool:
         """Whether the joint makes a whole turn, after which the motion repeats."""
-        return math.isclose(self.turns, 1.0, rel_tol=1e-9)
+        turns = [(last - first) / (2.0 * math.pi) for first, last in self.ends_of_others.values()]
+        return math.isclose(self.turns, 1.0, rel_tol=1e-9) and all(abs(one - round(one)) < 1e-9 for one in turns)
+
+    @property
+    def ends_of_others(self) -> dict[str, tuple[float, float]]:
+        """First and last angle [rad] or travel [m] of the other joints; the same for those that are held."""
+        return {name: one if isinstance(one, tuple) else (one, one) for name, one in self.held.items()}
+
+    @property
+    def alone(self) -> bool:
+        """Whether no other joint moves in the same time."""
+        return all(first == last for first, last in self.ends_of_others.values())
 
     @property
     def duration(self) -> float:

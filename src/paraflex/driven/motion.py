@@ -2,7 +2,7 @@
 
 import math
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, ClassVar
@@ -30,7 +30,7 @@ from paraflex.paths.closure import PathClosure
 from paraflex.paths.loops import LoopClosure
 from paraflex.validity import large_rotations, shared_loads
 from .assemblies import FoundAssembly, assemblies_of
-from .exact import Drive, ExactMotion
+from .exact import Drive, ExactMotion, Held
 from .features import KinematicFeatures, features_of
 from .loads import with_limits, with_loads
 from .ranges import Wish, check_determined, chosen_drive, driven_loops, followed, freedoms_at, ranged
@@ -94,10 +94,11 @@ class DrivenMotion(MotionRun):
     def exact(self) -> ExactMotion:
         """The motion at any time, exact to rounding: over one turn of the drive, with samples of its own."""
         drive, solution = self.drive, self.solution
-        if drive is not None and drive.turns > 1.0:
+        one_turn = drive is not None and drive.alone
+        if one_turn and drive is not None and drive.turns > 1.0:
             drive = replace(drive, end=drive.start + math.copysign(2.0 * math.pi, drive.end - drive.start))
         end = float(solution.t[-1]) if drive is None else drive.duration
-        times = np.linspace(0.0, end, _FINE if drive is not None else int(np.clip(solution.t.size, _FINE, _FINEST)))
+        times = np.linspace(0.0, end, _FINE if one_turn else int(np.clip(solution.t.size, _FINE, _FINEST)))
         passed, rigid = self.passed, self.rigid
         if times.size != solution.t.size or times[-1] != solution.t[-1]:
             if rigid is None:
@@ -125,7 +126,7 @@ def kinematics(
     mechanism: Mechanism | ModelWithPaths,
     drive: str | None = None,
     *,
-    held: Mapping[str, float] | None = None,
+    held: Held | None = None,
     path: Path | str | None = None,
     start: float | None = None,
     end: float | None = None,
@@ -145,8 +146,9 @@ def kinematics(
     drive : str, optional
         Joint that moves at constant speed. By default the mechanism's prescribed motions act. If they leave degrees of
         freedom open, the end-effector follows the model's path, or else the joint of the only motor moves.
-    held : mapping of str to float, optional
-        Other joints, which are held at an angle [rad] or travel [m], if there are several degrees of freedom.
+    held : mapping of str to float, or to a pair of float, optional
+        Other joints, which are held at an angle [rad] or travel [m], if there are several degrees of freedom. With a
+        pair a joint moves from the first to the second in the time of the drive, at constant speed.
     path : Path or str, optional
         Path of the end-effector, or for a model the name of one.
     start, end : float, optional
@@ -290,7 +292,7 @@ def torques(
     mechanism: Mechanism | ModelWithPaths,
     drive: str | None = None,
     *,
-    held: Mapping[str, float] | None = None,
+    held: Held | None = None,
     path: Path | str | None = None,
     mode: str | ActuationMode | None = None,
     start: float | None = None,

@@ -154,8 +154,8 @@ class KinematicsRequest:
     model: NamedChoice = field(default_factory=NamedChoice)
     drive: list[str] = repeatable(
         "--drive JOINT[=VALUE]",
-        "Joint that moves at constant speed, or one held at a value; repeatable. Default: the prescribed motions, the "
-        "path, or the only motor's joint.",
+        "Joint that moves at constant speed, or one held at a value, or that moves meanwhile, JOINT=FIRST:LAST; "
+        "repeatable. Default: the prescribed motions, the path, or the only motor's joint.",
     )
     path: str | None = path_option()
     start: str | None = option(
