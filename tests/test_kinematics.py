@@ -756,6 +756,8 @@ def test_the_commands_write_results_that_other_commands_take(rocker, tmp_path):
     assert all(one["force_max"] is None for one in summary["loads"]["joints"].values())
     assert summary["loads"]["drives"]["O"]["torque_max"] is None
     assert paraflex("plot", folder, "--out", tmp_path / "figures").returncode == 0
+    for over, says in (("o", 'did you mean "O"?'), ("O.angle", 'write "O", the coordinate of the joint')):
+        assert says in paraflex("plot", folder, "point_components", "--over", over).stderr
     done = paraflex("kinematics", "five_bar", "--drive", "A1=2.16:2", "--drive", "A2=1:57.3 deg", "--samples", "5")
     assert "A1 moves from 2.1600 rad to 2.0000 rad" in done.stdout
     assert "A2 moves from 1.0000 rad to 1.0001 rad in the same time" in done.stdout
@@ -801,12 +803,20 @@ def test_the_commands_write_results_that_other_commands_take(rocker, tmp_path):
         (["kinematics", "five_bar", "--drive", "A1", "--drive", "A2=60 rpm"], 'has two, "A2=FIRST:LAST"'),
         (["kinematics", "five_bar", "--drive", "A1", "--drive", "A1=3"], "--drive: one joint both moves and is held"),
         (["kinematics", "five_bar", "--drive", "A1=2", "--drive", "A2=3"], "--drive: nothing moves where all"),
+        (["kinematics", "five_bar", "--drive", "A1, A2"], "--drive: several joints .*; give one --drive for each"),
+        (["kinematics", "FILE", "--drive", "o"], r"--drive: unknown joint \(got 'o'\); did you mean \"O\"\?"),
+        (["kinematics", "FILE", "--drive", "O", "--speed", "60 1/min"], 'its own: write "60 rpm"'),
+        (["kinematics", "FILE", "--drive", "O", "--units", "DEG"], r'--units: .*; did you mean "deg"\?'),
+        (["kinematics", "FILE", "--drive", "O", "--units", "deg mm"], 'separate units by commas, as in "deg,mm"'),
+        (["torques", "FILE", "--flywheel", "0.02"], "--flywheel: no such option .*; write --fluctuation 0.02"),
+        (["torques", "FILE", "--helm", "0.02"], "--helm: no such option of paraflex torques; --help lists all"),
+        (["kinematics", "FOLDER", "--drive", "O"], "is a directory.*; name a TOML file, not a folder"),
         (["torques", "five_bar", "--mode", "+-"], r'--mode: mode "\+-" cannot drive'),
         (["torques", "four_bar", "--mode", "++"], "--mode: has no effect without a path"),
     ],
 )
 def test_wrong_requests_are_answered_in_one_line(rocker, tmp_path, words, message):
-    words = [str(rocker) if word == "FILE" else word for word in words]
+    words = [{"FILE": str(rocker), "FOLDER": str(tmp_path)}.get(word, word) for word in words]
     done = paraflex(*words, "--out", tmp_path / "out")
     assert done.returncode == 2, done.stdout
     (line,) = done.stderr.strip().splitlines()

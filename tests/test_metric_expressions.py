@@ -165,6 +165,7 @@ REFUSED = [
     ("max(sqrt(A1.rate))", "its unit is not known (got "),
     ("max(sin(tau1.torque))", "sin of a quantity in N m (got "),
     ("tau1.torque", "unknown metric (got 'tau1.torque'); a quantity of a run needs a function of its samples, as max("),
+    ("abs(tau1.torque)", "not one number of a run (got 'abs(tau1.torque)'); write max(abs(tau1.torque)), or"),
     ("(tau1.torque)", "not one number of a run (got '(tau1.torque)'); write max(abs(tau1.torque)), or"),
     ("max(A1.rate) + (tau1.torque)", "not one number of a run (got "),
     ("3 * (2)", "not one number of a run (got '3 * (2)'); write max(abs(body.point.y)), or"),

@@ -67,6 +67,9 @@ def _asked(model: Model, request: KinematicsRequest) -> dict[str, Any]:
     """Return drive, held joints, path, and start, end and speed of the drive, in SI units."""
     slides = {one.name: one.slides for one in model.mechanism.joints}
     moving = [text for text in request.drive if "=" not in text or text in slides]
+    for text in moving:
+        if len(names := [part.strip() for part in text.split(",")]) > 1 and slides.keys() >= set(names):
+            raise InputError("several joints", field="--drive", value=text, remedy="give one --drive for each of them")
     if len(moving) > 1:
         twice = len(set(moving)) < len(moving)
         raise InputError(
@@ -101,7 +104,9 @@ def _ends(joint: str, text: str, unit: str) -> float | tuple[float, ...]:
     try:
         found = tuple(_number(each, unit, "--drive") for each in text.split(":", 1))
     except InputError as error:
-        raise error.advising(f'{error.remedy}; a joint that moves has two, "{joint}=FIRST:LAST"') from None
+        raise error.advising(
+            f'{error.remedy}; a joint that moves has two, "{joint}=FIRST:LAST", and the drive a --speed'
+        ) from None
     return found if ":" in text else found[0]
 
 

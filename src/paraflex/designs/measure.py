@@ -74,7 +74,8 @@ def check_metric(
     if name not in METRICS:
         remedy = suggestion(name, list(known))
         if name != column:
-            remedy = f"a quantity of a run needs a function of its samples, as max(abs({column})); else {remedy}"
+            near = f"; else {remedy}" if remedy.startswith("did") else ""
+            remedy = f"a quantity of a run needs a function of its samples, as max(abs({column})){near}"
         raise InputError("unknown metric", field=field, value=column, remedy=remedy)
     with renamed(field, only="metrics"):
         try:

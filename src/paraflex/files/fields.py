@@ -168,7 +168,8 @@ def check_unit(
         remedy += f"; it depends on {', '.join(f'parameters.{name}' for name in named)}"
     # The dimensions differ in the angle only, as for a period computed from a speed, 2 * pi / n.
     if any(given[:3] == unit_named(unit).dimension[:3] for unit in units or ()):
-        remedy += '; an angle has a dimension of its own: the period of a speed n in rpm is "1 rev / n"'
+        remedy += "; an angle has a dimension of its own: "
+        remedy += 'write "60 rpm"' if "rad/s" in (units or ()) else 'the period of a speed n in rpm is "1 rev / n"'
     raise InputError(
         f"a quantity in {dimension_text(given)} where {expected} is asked for", field=field, value=text, remedy=remedy
     )

@@ -50,7 +50,8 @@ def read_text(path: Path) -> str:
     InputError
         Unreadable file; see `text_of`.
     """
-    return text_of(path, "file", None, unread="check its name", wrong="name a TOML file")
+    unread = "name a TOML file, not a folder" if path.is_dir() else "check its name"
+    return text_of(path, "file", None, unread=unread, wrong="name a TOML file")
 
 
 def text_of(path: Path, field: str, name: str | None, *, unread: str, wrong: str) -> str:

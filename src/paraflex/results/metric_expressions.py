@@ -284,7 +284,7 @@ def parsed(text: str) -> MetricExpression:
                                                   for name, call in parser.calls.items()}  # fmt: skip
     MetricExpression(tree, whole).value(lambda _: ones, lambda: ones)
     if not any(call.window for call in parser.calls.values()) or parser.is_series(tree):
-        name = next((name for name in _quantities(tree) if "." in name[1:]), "body.point.y")
+        name = next(iter(dotted_names(text)), "body.point.y")
         raise ExpressionError("not one number of a run", f"write max(abs({name})), or with another of "
                               f"{', '.join(REDUCTIONS)}")  # fmt: skip
     return MetricExpression(tree, parser.calls)
