@@ -139,17 +139,21 @@ def test_bad_input_is_one_line_and_exit_code_2(tmp_path, arguments, says):
     assert not list(tmp_path.rglob("summary*"))
 
 
-@pytest.mark.parametrize("options", [[], ["--rigid", "--out", "there"], ["--set", "link1.length=1"]])
-def test_run_without_a_model_says_what_can_be_run(tmp_path, options):
-    done = paraflex("run", *options, cwd=tmp_path)
+@pytest.mark.parametrize(
+    ("command", "options"),
+    [("run", []), ("run", ["--rigid", "--out", "there"]), ("run", ["--set", "link1.length=1"]),
+     ("kinematics", ["--drive", "O"]), ("torques", ["--out", "there"])],
+)  # fmt: skip
+def test_run_without_a_model_says_what_can_be_run(tmp_path, command, options):
+    done = paraflex(command, *options, cwd=tmp_path)
     assert done.returncode == 2
     assert done.stdout == ""
     lines = done.stderr.splitlines()
-    assert lines[0] == "error: no model is named; paraflex run NAME runs a mechanism of the library:"
+    assert lines[0] == f"error: no model is named; paraflex {command} NAME takes a mechanism of the library:"
     told = dict(line.split(maxsplit=1) for line in lines if line.startswith("  "))
     assert told == {name: load(name).mechanism.description for name in library_names()}
     assert "four_bars:N" in lines[-2]
-    assert all(way in lines[-1] for way in ("paraflex run FILE.toml", "paraflex new NAME"))
+    assert all(way in lines[-1] for way in (f"paraflex {command} FILE.toml", "paraflex new NAME"))
     assert not list(tmp_path.iterdir())
 
 

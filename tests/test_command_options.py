@@ -73,7 +73,9 @@ def test_models_are_named_by_argument_or_option(monkeypatch, command, line):
     assert called(monkeypatch, command, line) == ["five_bar"]
 
 
-@pytest.mark.parametrize("command", [name for name in MODEL_COMMANDS if name not in ("info", "run")])
+@pytest.mark.parametrize(
+    "command", [name for name in MODEL_COMMANDS if name not in ("info", "run", "kinematics", "torques")]
+)
 def test_without_a_name_it_is_the_papers(monkeypatch, command):
     assert called(monkeypatch, command, []) == ["raparm_i"]
 

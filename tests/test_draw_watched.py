@@ -221,7 +221,7 @@ def test_a_library_mechanism_has_sliders_too() -> None:
     ("options", "says"),
     [
         (("five_bar", "--output", "a.svg"), "--output: has no effect with --watch"),
-        (("five_bar", "--theme", "grey"), "theme: unknown theme (got 'grey')"),
+        (("five_bar", "--theme", "grey"), "error: --theme: unknown theme (got 'grey')"),
         (("nowhere.toml",), "nowhere.toml: file: cannot be read"),
         (("five_baar",), 'did you mean "five_bar"?'),
     ],

@@ -307,6 +307,9 @@ def test_a_file_over_the_travel_has_columns_in_units(tmp_path):
     (tmp_path / "stroke.csv").write_text("s [kg], M [N m]\n0, 0\n10, 2\n")
     with pytest.raises(InputError, match=r"column 1 of stroke.csv is in kg where m is asked for"):
         pf.load(tmp_path / "press.toml")
+    (tmp_path / "stroke.csv").write_text("0, 0, 0\n")
+    with pytest.raises(InputError, match=r"give guide.travel in m and a value in every line below the headings"):
+        pf.load(tmp_path / "press.toml")
 
 
 def test_rigid_torques_name_a_law_that_is_not_finite():
@@ -359,7 +362,22 @@ def test_files_hold_laws(tmp_path):
         ("'ram.T-1.vy' * 3", "5 mm * guide.travel", "a quantity in m^2 where one in N is asked for"),
         ('over = "1000 * guide.travel"', 'over = "2 * t"', "load.stroke.over: contains no joint and no point"),
         ("table = [[0, 0], [10, 2], [20, 5]]", "torque = 3", "load.stroke.over: is for tables only"),
-        ("[10, 2], [20, 5]", "[20, 2], [10, 5]", "ascend"),
+        ("[10, 2], [20, 5]", "[20, 2], [10, 5]", "its values of 1000 * guide.travel must ascend, but row 3 does not"),
+        (
+            '1000 * guide.travel"\ntable = [[0, 0], [10, 2]',
+            'guide.travel"\ntable = [[0, 0], ["-1 mm", 2]',
+            "its values of guide.travel must ascend, but row 2 does not (got -0.001); it follows 0 m",
+        ),
+        (
+            '1000 * guide.travel"\ntable = [[0,',
+            'guide.travel"\ntable = [["0 s",',
+            "give a list of [guide.travel, torque] in m and N m, or the name of a file with two such columns",
+        ),
+        (
+            '1000 * guide.travel"\ntable = [[0, 0]',
+            'guide.rate"\ntable = [[0, 0, 0]',
+            "give a list of [guide.rate, torque] in SI units and N m",
+        ),
         ("2 N s/m * bumper.length_rate", "t * 1 N/s", "linear_spring.bumper.force: contains the time"),
         ("bumper.length_rate", "bumber.length_rate", "linear_spring.bumper.force: unknown spring between points"),
         ("bumper.length_rate", "bumper.rate", "linear_spring.bumper.force: unknown joint"),

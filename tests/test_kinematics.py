@@ -8,6 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import scipy
 
 import paraflex as pf
 from paraflex.errors import InputError, UnreachablePathError
@@ -487,6 +488,45 @@ def test_a_motion_that_starts_at_a_change_point_is_refused():
         pf.kinematics(PARALLELOGRAM, "O", start=math.pi)
 
 
+def angles_of(motion):
+    data = pf.motion_dataset(motion)
+    return [data["angle"].sel(body=body).values for body in ("crank", "coupler", "rocker")]
+
+
+@pytest.mark.parametrize("beside", [-0.4, -0.01, -0.001, 0.1, 0.6])
+def test_a_motion_starts_beside_a_change_point_or_beyond_one(beside):
+    start = math.pi + math.radians(beside)
+    motion = pf.kinematics(PARALLELOGRAM, "O", start=start, end=math.pi + 0.3, samples=31)
+    crank, coupler, rocker = angles_of(motion)
+    assert np.max(np.abs(coupler)) < 1e-10
+    assert np.max(np.abs(rocker - crank)) < 1e-10
+    assert [motion.drive.at(t) for t in motion.passed] == pytest.approx([math.pi] if beside < 0.0 else [], abs=1e-6)
+    # Backwards, the motion ends where it started.
+    back = pf.kinematics(PARALLELOGRAM, "O", start=math.pi + 0.3, end=start, samples=31)
+    assert np.max(np.abs(angles_of(back)[2][::-1] - rocker)) < 1e-10
+
+
+@pytest.mark.parametrize("beside", [-0.1, 0.2])
+def test_a_crossed_parallelogram_starts_crossed_beside_a_change_point(beside):
+    start = math.pi + math.radians(beside)
+    crank, _, rocker = angles_of(
+        pf.kinematics(PARALLELOGRAM, "O", start=start, end=math.pi + 0.3, samples=31, assembly="crossed")
+    )
+    usual = np.abs(crank - math.pi) > 0.02
+    ratio = np.tan(crank / 2.0) / np.tan(rocker / 2.0)
+    assert ratio[usual] == pytest.approx(-(0.4 - 0.1) / (0.4 + 0.1), abs=1e-9)
+
+
+def test_a_motion_by_a_table_starts_beside_a_change_point():
+    angles = {"crank": math.radians(179.9), "coupler": 0.0, "rocker": math.radians(179.9)}
+    near = replace(PARALLELOGRAM, assemblies=(pf.Assembly("open", angles),))
+    t = np.linspace(0.0, 1.0, 11)
+    table = pf.TabulatedProfile(tuple(t), tuple(math.radians(179.9) + 0.3 * t))
+    motion = pf.kinematics(replace(near, prescribed=(pf.PrescribedAngle("O", "O", table),)), duration=1.0, samples=31)
+    assert np.max(np.abs(angles_of(motion)[1])) < 1e-11
+    assert motion.passed == pytest.approx([math.radians(0.1) / 0.3], abs=1e-6)
+
+
 def bar(name, a, b, length):
     return pf.RigidBody(
         name, mass=1.0, inertia=length**2 / 12, points={a: (0.0, 0.0), b: (length, 0.0)},
@@ -516,6 +556,48 @@ def picker(links=3):
         motors=(pf.Motor("m1", "O1"), pf.Motor("m2", "C1")), gravity=(0.0, -9.81),
         end_effector=pf.EndEffector(pf.PointRef("plate", "P"), ("x", "y")), assemblies=(pf.Assembly("a", angles),),
     )  # fmt: skip
+
+
+@pytest.mark.parametrize("beyond", [-1e-6, -1e-7, -1e-12, 0.0, 1e-10])
+@pytest.mark.parametrize("speed", [0.1, 1.0])
+def test_a_motion_ends_at_a_change_point(beyond, speed):
+    """The loops may close there, with accelerations that are rounding errors over the distance."""
+    motion = pf.torques(HEAVY, "O", start=math.pi - 0.3, end=math.pi + beyond, samples=31, speed=speed)
+    data = pf.motion_dataset(motion).isel(time=-1)
+    assert np.max(np.abs(data["angular_acceleration"])) < 1e-7 * speed**2
+    assert data["joint_force"].sel(joint="B").values == pytest.approx([-0.05 * speed**2, 0.0], abs=1e-6 * speed**2)
+
+
+HEAVY = replace(PARALLELOGRAM, bodies=tuple(bar(*one) for one in (
+    ("crank", "O", "A", 0.1), ("coupler", "A", "B", 0.4), ("rocker", "Q", "B", 0.1))))  # fmt: skip
+
+
+@pytest.mark.parametrize("half", [0.1, 0.005])
+def test_forces_at_a_change_point_are_the_limit_of_those_beside_it(half):
+    """The coupler's pins, which move alike, carry its inertia in equal parts: m r w^2 / 2 = 5 N, towards the pivots."""
+    span = {"start": math.pi - half, "end": math.pi + half, "speed": 10.0, "samples": 21}
+    motion = pf.torques(HEAVY, "O", **span)
+    at = pf.motion_dataset(motion).isel(time=10)
+    assert motion.drive.at(motion.solution.t[10]) == pytest.approx(math.pi, abs=1e-12)
+    within = 1e-7 if half > 0.02 else 3e-5
+    assert at["joint_force"].sel(joint="B").values == pytest.approx([-5.0, 0.0], abs=within)
+    assert float(at["drive_torque"].sel(drive="O")) == pytest.approx(0.0, abs=1e-7)
+    assert [one.code for one in motion.findings] == ["special-pose"]
+    # Weights do work on the motion of coupler and rocker that is free there. The drive does none, and has its torque.
+    motion = pf.torques(replace(HEAVY, gravity=(0.0, -9.81)), "O", **span)
+    at = pf.motion_dataset(motion).isel(time=10)
+    assert np.isnan(at["joint_force"].sel(joint="B", axis="x"))
+    # All weights sink by r cos(crank), or half of it: (1/2 + 1 + 1/2) m g r.
+    assert float(at["drive_torque"].sel(drive="O")) == pytest.approx(-2.0 * 9.81 * 0.1, rel=1e-7)
+    assert [one.code for one in motion.findings] == ["special-pose", "loads-unbounded"]
+    assert "forces in O, A, B, Q grow without bound towards O at 3.14159 rad" in motion.findings[-1].text
+
+
+def test_a_flywheel_takes_samples_at_change_points():
+    gravity = replace(HEAVY, gravity=(0.0, -9.81))
+    at, beside = (pf.torques(gravity, "O", start=math.radians(start), speed=10.0) for start in (30.0, 30.3))
+    assert np.isnan(at.solution.multipliers).any()
+    assert pf.flywheel(at, 0.05).inertia == pytest.approx(pf.flywheel(beside, 0.05).inertia, rel=1e-8)
 
 
 @pytest.mark.parametrize("links", [2, 3])
@@ -576,6 +658,30 @@ def test_a_model_with_a_path_follows_it_unless_a_drive_is_named():
     assert held.path == ""
     assert pf.motion_dataset(held)["joint_coordinate"].sel(joint="A2").values == pytest.approx(3.0, abs=1e-12)
     assert pf.kinematics(model, path="line", samples=5).path == "line"
+
+
+def test_two_cranks_of_a_five_bar_turn_together():
+    """Their drives do the work that the kinetic energy takes; mirrored, they move the point on the middle line."""
+    model = pf.load("five_bar")
+    motion = pf.torques(model, "A1", held={"A2": (0.9, 0.9 + 2.0 * math.pi)})
+    data = pf.motion_dataset(motion)
+    first, second = (data["joint_coordinate"].sel(joint=joint).values for joint in ("A1", "A2"))
+    assert second - first == pytest.approx(0.9 - 2.16, abs=1e-12)
+    assert motion.drive.full_turn
+    assert motion.features.time_ratios["B1"] == pytest.approx(motion.features.time_ratios["B2"], rel=1e-9)
+    power = (data["drive_torque"] * data["drive_speed"]).sum("drive").values
+    energy = data["kinetic_energy"].values
+    spline = scipy.interpolate.CubicSpline(motion.solution.t, energy, bc_type="periodic")
+    assert spline(motion.solution.t, 1) == pytest.approx(power, abs=1e-3 * np.max(np.abs(power)))
+    mirrored = pf.kinematics(model, "A1", start=2.16, end=2.0, held={"A2": (math.pi - 2.16, math.pi - 2.0)}, samples=5)
+    x = pf.motion_dataset(mirrored)["point_position"].sel(point="distal1.C", axis="x").values
+    assert x == pytest.approx(x[0], abs=1e-12)
+    for wrong, says in (((1.0, math.nan), "not a finite number"), ((1, 2, 3), "not a number or two numbers")):
+        with pytest.raises(InputError, match=rf"held\.A2: {says}"):
+            pf.kinematics(model, "A1", held={"A2": wrong})
+    slider = pf.load("slider_crank")
+    with pytest.raises(InputError, match="2 drives, where the mechanism has 1 degree of freedom"):
+        pf.kinematics(slider, "O", held={slider.mechanism.joints[-1].name: (0.1, 0.2)})
 
 
 def test_a_duration_gives_the_end_of_a_drive():
@@ -663,6 +769,11 @@ def test_the_commands_write_results_that_other_commands_take(rocker, tmp_path):
     done = paraflex("torques", *words, "--out", tmp_path / "torques")
     drawn = {each.stem for each in tmp_path.glob("torques/figures/*")}
     assert {"drive_efforts", "joint_forces", "frame_loads"} <= drawn
+    for over, says in (("o", 'did you mean "O"?'), ("O.angle", 'write "O", the coordinate of the joint')):
+        assert says in paraflex("plot", folder, "point_components", "--over", over).stderr
+    done = paraflex("kinematics", "five_bar", "--drive", "A1=2.16:2", "--drive", "A2=1:57.3 deg", "--samples", "5")
+    assert "A1 moves from 2.1600 rad to 2.0000 rad" in done.stdout
+    assert "A2 moves from 1.0000 rad to 1.0001 rad in the same time" in done.stdout
     assert "flywheel for a fluctuation of 0.02: 0.0754 kg m^2" in done.stdout
 
 
@@ -680,6 +791,7 @@ def test_paths_of_points_mark_cusps_and_crunodes(rocker):
     ("words", "message"),
     [
         (["torques", "FILE", "--drive", "O"], r"body\.crank\.mass: is missing"),
+        (["statics", "FILE"], r"error: .*rocker\.toml: body\.crank\.mass: is missing"),
         (["run", "FILE", "--duration", "1"], r"body\.crank\.mass: is missing"),
         (["kinematics", "FILE"], "--drive: is missing; name the joint that drives the mechanism: O, A, B, Q"),
         (
@@ -698,21 +810,47 @@ def test_paths_of_points_mark_cusps_and_crunodes(rocker):
         (["kinematics", "FILE", "--rpm", "60"], '--rpm: no such option of paraflex kinematics; write --speed "60 rpm"'),
         (["run", "FILE", "--drive", "O"], "--drive: no such option of paraflex run; it is one of paraflex kinematics"),
         (["kinematics", "FILE", "O"], r"kinematics: unexpected argument \(got 'O'\)"),
-        (["kinematics", "FILE", "--drive", "O", "--drive", "Q"], r"--drive: two joints move \(got 'O, Q'\); hold the"),
+        (
+            ["kinematics", "FILE", "--drive", "O", "--drive", "Q"],
+            r"--drive: two joints move \(got 'O, Q'\); hold the others, or give",
+        ),
         (["kinematics", "FILE", "--drive", "O", "--drive", "Q=1 m"], "--drive: a quantity in m where one in rad is"),
         (["kinematics", "FILE", "--drive", "O", "--drive", "Q="], r"--drive: has no value \(got 'Q='\)"),
+        (["kinematics", "FILE", "-drive", "O"], r"error: -drive: one dash; did you mean --drive\?"),
+        (
+            ["torques", "FILE", "-d", "O"],
+            r"-d: no such option of paraflex torques; did you mean --drive or --duration\?",
+        ),
         (["kinematics", "FILE", "--drive", "O", "--from", "abc"], "--from: not a number"),
+        (["kinematics", "five_bar", "--drive", "A1", "--drive", "A2=60 rpm"], 'has two, "A2=FIRST:LAST"'),
+        (["kinematics", "five_bar", "--drive", "A1", "--drive", "A1=3"], "--drive: one joint both moves and is held"),
+        (["kinematics", "five_bar", "--drive", "A1=2", "--drive", "A2=3"], "--drive: nothing moves where all"),
+        (["kinematics", "five_bar", "--drive", "A1, A2"], "--drive: several joints .*; give one --drive for each"),
+        (["kinematics", "FILE", "--drive", "o"], r"--drive: unknown joint \(got 'o'\); did you mean \"O\"\?"),
+        (["kinematics", "FILE", "--drive", "O", "--speed", "60 1/min"], 'its own: write "60 rpm"'),
+        (["kinematics", "FILE", "--drive", "O", "--units", "DEG"], r'--units: .*; did you mean "deg"\?'),
+        (["kinematics", "FILE", "--drive", "O", "--units", "deg mm"], 'separate units by commas, as in "deg,mm"'),
+        (["torques", "FILE", "--flywheel", "0.02"], "--flywheel: no such option .*; write --fluctuation 0.02"),
+        (["torques", "FILE", "--helm", "0.02"], "--helm: no such option of paraflex torques; --help lists all"),
+        (["kinematics", "FOLDER", "--drive", "O"], "is a directory.*; name a TOML file, not a folder"),
         (["torques", "five_bar", "--mode", "+-"], r'--mode: mode "\+-" cannot drive'),
         (["torques", "four_bar", "--mode", "++"], "--mode: has no effect without a path"),
     ],
 )
 def test_wrong_requests_are_answered_in_one_line(rocker, tmp_path, words, message):
-    words = [str(rocker) if word == "FILE" else word for word in words]
+    words = [{"FILE": str(rocker), "FOLDER": str(tmp_path)}.get(word, word) for word in words]
     done = paraflex(*words, "--out", tmp_path / "out")
     assert done.returncode == 2, done.stdout
     (line,) = done.stderr.strip().splitlines()
     assert re.search(message, line)
     assert not (tmp_path / "out").exists()
+
+
+def test_a_file_without_masses_is_named_and_a_model_that_is_not_named_is_told(rocker):
+    done = paraflex("info", rocker)
+    assert done.returncode == 2
+    assert done.stderr.startswith(f"error: {rocker}: body.crank.mass: is missing")
+    assert paraflex("modes").stderr == "no model is named: this is raparm_i\n"
 
 
 def test_points_that_pause_with_the_whole_mechanism_have_no_cusp():

@@ -8,7 +8,7 @@ import pytest
 
 import paraflex as pf
 from made_up import write_study
-from paraflex.designs.measure import measure, metrics_of
+from paraflex.designs.measure import measure, metric_figures, metrics_of
 from paraflex.designs.run import run_task
 from paraflex.errors import InputError
 from paraflex.formatting import display_unit, output_units
@@ -166,6 +166,7 @@ REFUSED = [
     ("max(sqrt(A1.rate))", "its unit is not known (got "),
     ("max(sin(tau1.torque))", "sin of a quantity in N m (got "),
     ("tau1.torque", "unknown metric (got 'tau1.torque'); a quantity of a run needs a function of its samples, as max("),
+    ("abs(tau1.torque)", "not one number of a run (got 'abs(tau1.torque)'); write max(abs(tau1.torque)), or"),
     ("(tau1.torque)", "not one number of a run (got '(tau1.torque)'); write max(abs(tau1.torque)), or"),
     ("max(A1.rate) + (tau1.torque)", "not one number of a run (got "),
     ("3 * (2)", "not one number of a run (got '3 * (2)'); write max(abs(body.point.y)), or"),
@@ -177,7 +178,7 @@ REFUSED = [
     ("max(abs(A1.rate)", "no such expression of a metric (got 'max(abs(A1.rate)'); write it like max(abs(body.p"),
     ("rms(A1.rate[0.05:0.02])", "a window that ends before it begins (got "),
     ("rms(A1.rate[0.02:0.04] + B1.rate[0.05:])", "a window that ends before it begins (got "),
-    ("rms(A1.rate[0.02:5])", "a window until 5 s, and runs end at 0.06 s (got 'rms(A1.rate[0.02:5])'); choose an"),
+    ("rms(A1.rate[0.02:5])", "the window [0.02:5] is not within the run, from 0 s to 0.06 s (got "),
     ("rms(A1.rate[-0.1:])", "a window outside the run (got "),
     ("rms(A1.rate[0.02])", "not a window of time of a quantity (got "),
     ("rms(A1.rate[::2])", "not a window of time of a quantity (got "),
@@ -195,6 +196,9 @@ REFUSED = [
     ("max([x for x in A1.rate])", "only numbers, parameters, + - * / ** and brackets may stand in"),
     ("max(f'{A1.rate}' + A1.rate)", "only numbers, parameters, + - * / ** and brackets may stand in"),
     ("max(lambda: 0)", "max of a number, not of a quantity of the run (got "),
+    ("max(A1.rte) + 1 foo", "no such quantity (got 'A1.rte'); did you mean \"A1.rate\"?"),
+    ("max(A1.rte[0:1 kg])", "no such quantity (got 'A1.rte'); did you mean \"A1.rate\"?"),
+    ("max(A1.rate) + 1 foo", 'unknown unit "foo" (got '),
     ("max(\n)", "max takes one quantity, not 0"),
     ("max(\x00)", "no such expression of a metric (got "),
 ]  # fmt: skip
@@ -221,8 +225,16 @@ def test_a_joint_that_slides_and_a_rigid_body_have_other_quantities(crank):
         with pytest.raises(InputError) as error:
             metrics_of([metric], "motion", mechanism, "motion")
         assert says in str(error.value)
-    with pytest.raises(InputError, match=r"no sample lies in the window \(got '\[0.00011:0.00012\]'\)"):
+    with pytest.raises(InputError, match=r"no sample lies in the window \[0.00011:0.00012\] \(got 'max"):
         pf.metrics(crank[0], ["max(rail.rate[0.00011:0.00012])"])
+    with pytest.raises(InputError, match=r"metrics: the window \[5:\] is not within the run, from 0 s to [0-9.]* s"):
+        pf.metrics(crank[0], ["max(rail.rate[5:])"])
+    for metric in ("max(rail.travel)/0", "max(1 / (rail.travel - rail.travel))"):
+        with pytest.raises(InputError, match="metrics: not a finite number") as error:
+            pf.metrics(crank[0], [metric])
+        assert error.value.value == metric
+    kept = metric_figures(crank[0], ["max(rail.travel)/0"])["max(rail.travel)/0"]
+    assert kept == {"value": None, "unit": "m", "reason": "not a finite number"}
     with pytest.raises(InputError, match="unknown metric"):
         pf.metrics(crank[0], ["tracking"])
     with pytest.raises(InputError, match="a metric of runs along a path, not of runs without a path"):

@@ -147,6 +147,8 @@ def suggestion(name: object, known: Iterable[str]) -> str:
     If no name is close as a whole, names that contain a close word are candidates: "centre_of_mass" for "center".
     """
     known = list(known)
+    if len(same := [each for each in known if each.casefold() == str(name).casefold()]) == 1:
+        return f'did you mean "{same[0]}"?'
     near = get_close_matches(str(name), known, n=2)
     near = near or [each for each in known if get_close_matches(str(name), each.split("_"), n=1)]
     alike = [SequenceMatcher(None, str(name), each).ratio() for each in near]

@@ -114,6 +114,7 @@ _DOUBTFUL = {
     "frequency-low": "The natural frequency of a link is implausibly low.",
     "torque-large": "Torques or forces are far beyond what mass, size and speed make plausible.",
     "force-large": "Forces of joints or drives are far beyond what mass, acceleration and loads make plausible.",
+    "loads-unbounded": "Forces of joints grow without bound towards a change point, where assemblies meet.",
     "loads-undetermined": "Redundant constraints leave forces or moments of joints undetermined.",
     "stress-over-strength": "The stress in a beam exceeds the strength of its material: the safety factor is below 1.",
     "deflection-large": "A link bends so far that it is more a spring than a link.",

@@ -252,6 +252,8 @@ def checked_units(units: Iterable[tuple[str, str]], field: str = "units") -> dic
         elif not found or name not in ("", found):
             problem = f"not a unit of {name or 'a quantity that is shown'}"
             remedy = f'write "{QUANTITIES[name]}"' if name else f"choose from units of {', '.join(QUANTITIES)}"
+            if not found and " " in unit:
+                remedy = f'separate units by commas, as in "{",".join(unit.split())}"'
         elif found in out:
             problem, remedy = f"a second unit of {found} beside {out[found].name}", "leave one of them out"
         else:

@@ -165,6 +165,7 @@ def unknown_unit(text: str) -> tuple[str, str] | None:
     for found in _BEHIND_NUMBER.finditer(text):
         if found[1] not in UNITS:
             near = list(dict.fromkeys([*_mistyped(found[1]), *get_close_matches(found[1], UNITS, n=1)]))
+            near = near or [unit for unit in UNITS if unit.casefold() == found[1].casefold()]
             meant = " or ".join(f'"{each}"' for each in near)
             return found[1], f"did you mean {meant}?" if near else 'write units like "mm^2", "N m/rad" or "rpm"'
     return None

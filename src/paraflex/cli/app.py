@@ -22,7 +22,8 @@ from .signals import exit_code
 # Errors of the command line, of Click or of Typer's copy of it.
 _USAGE: type[Exception] = typer.BadParameter.__bases__[0]
 # Options of other programs, and those of paraflex for the same.
-_MEANT = {"--rpm": 'write --speed "60 rpm"', "--range": 'write --from "0 deg" --to "90 deg"'}
+_MEANT = {"--rpm": 'write --speed "60 rpm"', "--range": 'write --from "0 deg" --to "90 deg"',
+          "--flywheel": "write --fluctuation 0.02"}  # fmt: skip
 
 app: typer.Typer = typer.Typer(
     name="paraflex",
@@ -119,9 +120,14 @@ def _usage(error: Any) -> InputError:
     option, alike = getattr(error, "option_name", ""), getattr(error, "possibilities", ())
     if option and hasattr(error, "possibilities"):
         others = [one.name for one in COMMANDS if option in flags_of(one.request)]
+        # "-d" has the letter of "--drive".
+        params = [] if error.ctx is None else error.ctx.command.params
+        alike = alike or [flag for one in params for flag in one.opts if flag.startswith(f"-{option}")]
+        alike = [flag for flag in alike if flag != "--help"]
         remedy = f"did you mean {' or '.join(sorted(alike))}?" if alike else "--help lists all"
         remedy = f"it is one of paraflex {listed(others, 3)}" if others else remedy
-        return InputError(f"no such option of paraflex {command}", field=option, remedy=_MEANT.get(option, remedy))
+        problem = f"no such option of paraflex {command}".strip()
+        return InputError(problem, field=option, remedy=_MEANT.get(option, remedy))
     if option:
         return InputError("has no value", field=option, remedy="write one behind it; --help describes it")
     if "extra argument" in text:

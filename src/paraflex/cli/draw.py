@@ -77,7 +77,8 @@ def _watch(request: DrawRequest) -> int:
     """Draw the mechanism again whenever its file is saved, until a signal ends it; return the exit code."""
     if request.output is not None:
         raise conflict("has no effect with --watch, whose drawing is a page", "--output", request.output)
-    theme(request.theme)
+    with flagged(request):
+        theme(request.theme)
     if not Path(request.model.name).exists():
         requested_model(request.model)
     from .watch import WatchServer

@@ -20,13 +20,15 @@ from . import COMPLETE
 from .commands.models import KinematicsRequest, TorquesRequest
 from .commands.requests import flagged, flags
 from .ending import give_dataset
-from .request import command_provenance, locating_errors, of_assembly, requested_model
+from .request import command_provenance, locating_errors, of_assembly, requested_model, without_model
 from .run_lines import load_lines
 from .tables import PlainConsole, print_tables
 
 
 def kinematics_command(request: KinematicsRequest) -> int:
     """Compute a driven motion, print it and, with --out, write files; return the exit code."""
+    if request.model.given is None:
+        return without_model("torques" if isinstance(request, TorquesRequest) else "kinematics")
     model = requested_model(request.model)
     give_dataset("motion", lambda: _data(model, request), _summary, _print, request.files)
     return COMPLETE
@@ -65,27 +67,47 @@ def _asked(model: Model, request: KinematicsRequest) -> dict[str, Any]:
     """Return drive, held joints, path, and start, end and speed of the drive, in SI units."""
     slides = {one.name: one.slides for one in model.mechanism.joints}
     moving = [text for text in request.drive if "=" not in text or text in slides]
+    for text in moving:
+        if len(names := [part.strip() for part in text.split(",")]) > 1 and slides.keys() >= set(names):
+            raise InputError("several joints", field="--drive", value=text, remedy="give one --drive for each of them")
     if len(moving) > 1:
         twice = len(set(moving)) < len(moving)
         raise InputError(
             "names a joint twice" if twice else "two joints move", field="--drive", value=", ".join(moving),
-            remedy="leave one out" if twice else f'hold the others: --drive "{moving[1]}=VALUE"',
+            remedy="leave one out" if twice
+            else f'hold the others, or give their ends: --drive "{moving[1]}=VALUE" or "{moving[1]}=FIRST:LAST"',
         )  # fmt: skip
-    drive, held = next(iter(moving), None), dict[str, float]()
-    unit = "m" if slides.get(drive or "", False) else "rad"
+    drive, held = next(iter(moving), None), dict[str, Any]()
     for text in request.drive:
         joint, _, value = (part.strip() for part in text.rpartition("="))
         if text not in moving:
             if joint in held or not value:
                 problem = "holds a joint twice" if joint in held else "has no value"
                 raise InputError(problem, field="--drive", value=text, remedy='write one such as "JOINT=30 deg"')
-            held[joint] = _number(value, "m" if slides[joint] else "rad", "--drive") if joint in slides else 0.0
+            held[joint] = _ends(joint, value, "m" if slides.get(joint) else "rad")
+    ends = dict[str, Any]()
+    if drive is None and request.start is None and request.end is None:
+        # Without a joint that moves alone, the first with two values is the drive.
+        drive = next((joint for joint, one in held.items() if isinstance(one, tuple)), None)
+        ends = {} if drive is None else dict(zip(("start", "end"), held.pop(drive), strict=True))
+    unit = "m" if slides.get(drive or "", False) else "rad"
     texts = {"start": (request.start, unit), "end": (request.end, unit), "speed": (request.speed, f"{unit}/s")}
     flag, path = flags(request), request.path
     found = {name: _number(text, wanted, flag[name]) for name, (text, wanted) in texts.items() if text is not None}
     of_file = path is not None and path not in model.paths and path.endswith(".toml")
     asked: dict[str, Any] = {"drive": drive, "held": held, "path": load_path(path) if of_file and path else path}
-    return asked | found
+    return asked | ends | found
+
+
+def _ends(joint: str, text: str, unit: str) -> float | tuple[float, ...]:
+    """Return the value at which a joint is held, or the first and last one of a joint that moves."""
+    try:
+        found = tuple(_number(each, unit, "--drive") for each in text.split(":", 1))
+    except InputError as error:
+        raise error.advising(
+            f'{error.remedy}; a joint that moves has two, "{joint}=FIRST:LAST", and the drive a --speed'
+        ) from None
+    return found if ":" in text else found[0]
 
 
 def _number(text: str, unit: str, field: str) -> float:
@@ -114,7 +136,9 @@ def _print(out: PlainConsole, data: xr.Dataset) -> None:
         out.print_lines(f"{data.attrs['mechanism']}: {free}; {drive['joint']} moves from {ends}{turn}, at {speed}; "
                         f"{count} positions")  # fmt: skip
         for joint, value in drive["held"].items():
-            out.print_lines(f"{joint} is held at {quantity(value, found['joint_units'][joint], digits=5)}")
+            ends = [quantity(one, found["joint_units"][joint], digits=5) for one in np.atleast_1d(value)]
+            moves = f"moves from {' to '.join(ends)} in the same time" if len(ends) > 1 else f"is held at {ends[0]}"
+            out.print_lines(f"{joint} {moves}")
         if None not in drive["reach"]:
             low, high = (quantity(value, unit, digits=7) for value in drive["reach"])
             out.print_lines(f"limits of reach of {drive['joint']}: {low} and {high}; the range ends beside them")

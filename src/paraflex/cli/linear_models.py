@@ -29,7 +29,6 @@ from .request import (
     find_modes,
     find_path,
     locating_errors,
-    naming_laws,
     of_assembly,
     plan_study,
     requested_model,
@@ -143,7 +142,7 @@ def _models(
     """Return the linear models in all modes: about the given motions, else at rest or about the planned motion."""
     ports = {"forces": request.forces, "prescribed": request.prescribed, "coordinates": request.coordinates}
     parameters = _parameters(model, modes, request, command)
-    with flagged(request), naming_laws(model):
+    with flagged(request):
         if motions is None and request.at is None and request.along is None and request.path is None:
             pose = requested_pose(model, request.pose, request.assembly, "--pose")
             models = [_at_rest(model, pose, mode, request.balanced, ports) for mode in modes]

@@ -1,6 +1,7 @@
 """Common parts of commands that simulate a study: model, paths, modes, controllers, plan, and errors."""
 
 import math
+import sys
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict
@@ -8,7 +9,7 @@ from typing import Any
 
 from paraflex.control.laws.described import NONE, ControllerDescription
 from paraflex.errors import AssemblyError, InputError, UnreachablePathError, renamed
-from paraflex.files import Model, load, load_path
+from paraflex.files import Model, generator_names, library_names, load, load_path
 from paraflex.files.outside import may_be_outside
 from paraflex.files.overlay import value_of
 from paraflex.formatting import prefer_units
@@ -16,9 +17,11 @@ from paraflex.mechanism import ActuationMode, Mechanism
 from paraflex.paths import Path as EndEffectorPath
 from paraflex.tracking import TrackingTask
 from paraflex.validity import likely_cause
+from . import BAD_INPUT
 from .commands.options import FramesChoice, ModelChoice, PlanChoice
 from .commands.requests import flagged
 from .commands.runs import RunRequest
+from .tables import PlainConsole
 
 
 def requested_model(choice: ModelChoice) -> Model:
@@ -31,9 +34,24 @@ def requested_model(choice: ModelChoice) -> Model:
         if not (name.strip() and equals):
             raise InputError("not FIELD=VALUE", field="--set", value=text, remedy='write "link1.length=0.3"')
         found[name.strip()] = value_of(value.strip())
+    if choice.given is None:
+        print(f"no model is named: this is {choice.name}", file=sys.stderr)
     model = load(choice.name, set=found)
     prefer_units(model.parameters.get("units", {}))
     return model
+
+
+def without_model(command: str) -> int:
+    """Print the mechanisms of the library and the ways to run one's own; return the exit code."""
+    console, names = PlainConsole(stderr=True), library_names()
+    console.print_lines(f"error: no model is named; paraflex {command} NAME takes a mechanism of the library:")
+    width = max(map(len, names))
+    console.print_lines(*(f"  {name:<{width}}  {load(name).mechanism.description}" for name in names))
+    console.print_lines(
+        f"or one of any size: {', '.join(generator_names())}",
+        f"paraflex {command} FILE.toml takes your own; paraflex new NAME writes such a file to edit",
+    )
+    return BAD_INPUT
 
 
 def command_provenance(model: Model, run: Mapping[str, Any]) -> dict[str, Any]:
@@ -170,13 +188,3 @@ def located_error(error: InputError, model: Model) -> InputError:
 def conflict(problem: str, flag: str, value: object) -> InputError:
     """Return the error of an option that does not go with another."""
     return InputError(problem, field=flag, value=value, remedy="leave one of them out")
-
-
-@contextmanager
-def naming_laws(model: Model) -> Iterator[None]:
-    """Add the file of a model to errors of its laws of forces raised inside the context."""
-    try:
-        yield
-    except InputError as error:
-        of_law = error.field.startswith(("load.", "linear_spring.")) and not error.source
-        raise (error.in_file(model.source) if of_law else error) from None

@@ -6,28 +6,25 @@ from dataclasses import asdict
 from pathlib import Path
 
 from paraflex.errors import InputError
-from paraflex.files import Model, generator_names, library_names, load
+from paraflex.files import Model
 from paraflex.folders import RUN
 from paraflex.mechanism import Mechanism, finite_segments, proportional_segments
 from paraflex.mechanism.actuation_modes import following
 from paraflex.writing import portable_name
-from . import BAD_INPUT
 from .along import run_along
 from .commands.requests import flagged
 from .commands.runs import RunRequest
 from .integration import given_flags, integration_options, reduced_option
 from .motion import run_motion
 from .replacing import hold_results
-from .request import conflict, find_modes, find_paths, requested_model, with_frames
+from .request import conflict, find_modes, find_paths, requested_model, with_frames, without_model
 from .stops import check_stops
-from .tables import PlainConsole
 
 
 def run_command(request: RunRequest) -> int:
     """Run a study and write its results; return the exit code. Without a model, print what can be run."""
     if request.model.given is None:
-        _print_choices(PlainConsole(stderr=True))
-        return BAD_INPUT
+        return without_model("run")
     model = requested_model(request.model)
     _check_fidelity(request)
     options = integration_options(request, model.study)
@@ -45,18 +42,6 @@ def run_command(request: RunRequest) -> int:
             for name, folder in _folders(paths, Path(request.out)).items()
         }
         return run_along(request, model, requested_mechanism(model, request), followed, modes, options)
-
-
-def _print_choices(console: PlainConsole) -> None:
-    """Print the mechanisms of the library and the ways to run one's own."""
-    console.print_lines("error: no model is named; paraflex run NAME runs a mechanism of the library:")
-    names = library_names()
-    width = max(map(len, names))
-    console.print_lines(*(f"  {name:<{width}}  {load(name).mechanism.description}" for name in names))
-    console.print_lines(
-        f"or one of any size: {', '.join(generator_names())}",
-        "paraflex run FILE.toml runs your own; paraflex new NAME writes such a file to edit",
-    )
 
 
 def _folders(paths: Iterable[str], out: Path) -> dict[str, Path]:

@@ -110,9 +110,10 @@ def metric_lines(runs: Mapping[str, Mapping[str, Any]]) -> list[str]:
     """Return a line for each metric that was asked for, of each run by its name, which may be empty."""
     return [
         f"{f'mode {name}, ' if name else ''}{metric_label(column)}: "
-        + ("-" if one["value"] is None else quantity(one["value"], one["unit"], digits=4, padded=False))
+        + (quantity(value, one["unit"], digits=4, padded=False) if value is not None else one.get("reason", "-"))
         for name, run in runs.items()
         for column, one in run.get("metrics", {}).items()
+        for value in [one["value"]]
     ]
 
 

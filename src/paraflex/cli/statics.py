@@ -21,7 +21,7 @@ from . import COMPLETE, FAILURE
 from .commands.models import StaticsRequest
 from .commands.requests import flagged
 from .ending import give_dataset
-from .request import command_provenance, naming_laws, of_assembly, requested_model
+from .request import command_provenance, of_assembly, requested_model
 from .run_lines import metric_lines
 from .tables import PlainConsole, print_tables
 
@@ -38,7 +38,6 @@ def _data(model: Model, request: StaticsRequest) -> xr.Dataset:
     requested = _requested(model, request)
     with flagged(request, first=True):
         metrics_of(request.metrics, model.study.error, runs=STATICS)
-    with flagged(request, first=True), naming_laws(model):
         try:
             found = statics(
                 model, **vars(requested), warning=False,

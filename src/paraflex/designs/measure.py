@@ -9,12 +9,13 @@ from paraflex.arguments import checked_arguments
 from paraflex.arrays import NDArray
 from paraflex.equilibria.result import Statics
 from paraflex.errors import InputError, IntegrationError, Moment, as_enum, renamed, suggestion
+from paraflex.expressions.evaluate import expressed_in
 from paraflex.integrators.between import COARSE
 from paraflex.mechanism import Mechanism
 from paraflex.mechanism.quantities import all_listed
 from paraflex.motion import MotionRun
 from paraflex.results.following import HEADLINE, ErrorSpan
-from paraflex.results.formulas import SAME_TIME
+from paraflex.results.metric_expressions import dotted_names, parsed
 from paraflex.results.metrics import (
     ALWAYS,
     METRICS,
@@ -26,7 +27,6 @@ from paraflex.results.metrics import (
     MetricMembers,
     has_loads,
     metric_name,
-    metric_until,
 )
 from paraflex.results.numbers import finite_or_none
 from paraflex.results.run_traces import MotionTraces, RunTraces, StaticsTraces, run_traces
@@ -49,7 +49,9 @@ def metric_of(column: str) -> Metric:
     return METRICS[metric_name(column)]
 
 
-def check_metric(column: str, field: str = "metrics", known: Sequence[str] = tuple(METRICS)) -> None:
+def check_metric(
+    column: str, field: str = "metrics", known: Sequence[str] = tuple(METRICS), members: MetricMembers | None = None
+) -> None:
     """Check that the metric of a column exists.
 
     Parameters
@@ -60,6 +62,8 @@ def check_metric(column: str, field: str = "metrics", known: Sequence[str] = tup
         Field of the error.
     known : sequence of str
         Names that the error suggests; by default those of all metrics.
+    members : MetricMembers, optional
+        Members of the mechanism, in which the quantities of an expression are looked up before its units.
 
     Raises
     ------
@@ -70,10 +74,16 @@ def check_metric(column: str, field: str = "metrics", known: Sequence[str] = tup
     if name not in METRICS:
         remedy = suggestion(name, list(known))
         if name != column:
-            remedy = f"a quantity of a run needs a function of its samples, as max(abs({column})); else {remedy}"
+            near = f"; else {remedy}" if remedy.startswith("did") else ""
+            remedy = f"a quantity of a run needs a function of its samples, as max(abs({column})){near}"
         raise InputError("unknown metric", field=field, value=column, remedy=remedy)
     with renamed(field, only="metrics"):
-        _ = METRICS[name]
+        try:
+            _ = METRICS[name]
+        except InputError:
+            if members is not None:
+                list(map(members.quantity, dotted_names(name)))
+            raise
 
 
 def metrics_of(
@@ -103,15 +113,16 @@ def metrics_of(
     InputError
         A name is unknown, such runs do not have the metric, or an expression does not fit the mechanism.
     """
+    members = None if mechanism is None or runs == STATICS else MetricMembers(mechanism)
     for name in names:
-        check_metric(name)
+        check_metric(name, members=members)
         if name not in METRICS:
             raise InputError(
                 f"a metric of each {metric_of(name).each or 'run'} is kept of all", field="metrics", value=name,
                 remedy=f'write "{metric_of(name).name}"',
             )  # fmt: skip
-        if mechanism is not None and runs != STATICS:
-            METRICS[name].columns(MetricMembers(mechanism))
+        if members is not None:
+            METRICS[name].columns(members)
             check_window(name, duration)
         if runs not in METRICS[name].runs:
             raise InputError(
@@ -131,12 +142,9 @@ def metrics_of(
 
 def check_window(name: str, duration: float | None) -> None:
     """Check that the windows of a metric by expression lie within runs of a duration [s], if it is known."""
-    until = metric_until(name)
-    if duration is not None and until > duration * (1.0 + SAME_TIME):
-        raise InputError(
-            f"a window until {until:g} s, and runs end at {duration:g} s", field="metrics", value=name,
-            remedy="choose an earlier one, or leave out its end",
-        )  # fmt: skip
+    if duration is not None and "(" in name:
+        with expressed_in("metrics", name):
+            parsed(name).check_windows(duration)
 
 
 def metric_columns(run: Runs, names: Sequence[str]) -> tuple[str, ...]:
@@ -203,15 +211,15 @@ def metric_figures(run: Runs, names: Sequence[str]) -> dict[str, dict[str, Any]]
     members, out = _members(run), {}
     complete = run.solution.status == "complete"
     for name in names:
-        columns = METRICS[name].columns(members)
+        columns, why = METRICS[name].columns(members), dict[str, str]()
         try:
             found = measure(run, [name]) if complete else {}
         # A window may have no sample; the results of the run are kept all the same.
-        except InputError:
-            found = {}
+        except InputError as error:
+            found, why = {}, {"reason": error.problem}
         for column in columns:
             value = finite_or_none(found.get(column, float("nan")))
-            out[column] = {"value": value, "unit": METRICS[name].unit_of(column, members)}
+            out[column] = {"value": value, "unit": METRICS[name].unit_of(column, members), **why}
     return out
 
 

@@ -201,6 +201,11 @@ def make_setting(table: SweepTable, folder: FilePath) -> tuple[Setting, tuple[Sw
         runs = MOTION if paths == (NO_PATH,) else PATH
     data = model.parameters
     parameters = tuple(_varied(name, entry, data) for name, entry in table.vary.items())
+    duration = table.duration
+    # Runs last as long as the file describes, unless designs vary it.
+    if runs != STATICS and not any(field.startswith(("path.", "study.")) for one in parameters for field in one.fields):
+        own = model.study.duration
+        duration = own if runs == MOTION and duration is None else min(model.duration(path, duration) for path in paths)
     setting = Setting(
         data=data,
         source=model.source,
@@ -213,7 +218,7 @@ def make_setting(table: SweepTable, folder: FilePath) -> tuple[Setting, tuple[Sw
         samples=table.samples,
         assembly=table.assembly,
         integration=_integration(table),
-        metrics=metrics_of(table.metrics, model.study.error, model.mechanism, runs, table.duration),
+        metrics=metrics_of(table.metrics, model.study.error, model.mechanism, runs, duration),
         trajectories=table.trajectories,
         versions=versions(),
         text=model.text,

@@ -22,6 +22,8 @@ from paraflex.paths.loops import ClosedLoops, LoopClosure
 
 # Part of a turn or travel, on either side of a change point, over which a motion is interpolated.
 _BESIDE = 1.0 / 720.0
+# Part of this time within which a sample is at the change point.
+AT = 1e-3
 # Deviation beyond a change point from the motion before it, as a part of the move, on the same branch.
 _SAME_BRANCH = 0.05
 # Singular value of constraints that depend on others, relative to the largest, and accuracy of a change point.
@@ -29,6 +31,8 @@ _DEPENDENT = 1e-9
 # Change points that a motion may pass.
 _MOST_PASSED = 100
 Target = Callable[[Array], Array]
+# Values at which other joints are held, or between which they move [rad, m].
+Held = Mapping[str, float | tuple[float, float]]
 NO_TASKS = np.zeros(0, dtype=np.int64)
 
 
@@ -67,8 +71,9 @@ class Drive:
     reach : tuple of float or None
         Lowest and highest angle or travel that the mechanism allows in this assembly, None for those that do not lie
         in the range examined.
-    held : mapping of str to float
-        Other joints that are held, with their angles [rad] or travels [m].
+    held : mapping of str to float, or to a pair of float
+        Other joints that are held, with their angles [rad] or travels [m]; a pair is the first and last one of a joint
+        that moves in the same time, at constant speed.
     """
 
     name: str
@@ -78,7 +83,7 @@ class Drive:
     speed: float
     unit: str
     reach: tuple[float | None, float | None] = (None, None)
-    held: Mapping[str, float] = field(default_factory=dict)
+    held: Held = field(default_factory=dict)
 
     @property
     def turns(self) -> float:
@@ -88,7 +93,18 @@ class Drive:
     @property
     def full_turn(self) -> bool:
         """Whether the joint makes a whole turn, after which the motion repeats."""
-        return math.isclose(self.turns, 1.0, rel_tol=1e-9)
+        turns = [(last - first) / (2.0 * math.pi) for first, last in self.ends_of_others.values()]
+        return math.isclose(self.turns, 1.0, rel_tol=1e-9) and all(abs(one - round(one)) < 1e-9 for one in turns)
+
+    @property
+    def ends_of_others(self) -> dict[str, tuple[float, float]]:
+        """First and last angle [rad] or travel [m] of the other joints; the same for those that are held."""
+        return {name: one if isinstance(one, tuple) else (one, one) for name, one in self.held.items()}
+
+    @property
+    def alone(self) -> bool:
+        """Whether no other joint moves in the same time."""
+        return all(first == last for first, last in self.ends_of_others.values())
 
     @property
     def duration(self) -> float:
@@ -126,11 +142,11 @@ def follow_past(
         count = int(np.searchsorted(t, singular - beside, side="right"))
         start, begun = (float(t[count - 1]), found.arrays[1][count - 1]) if count else (float(grid[0]), pose)
         # Motions along paths end at singular positions of their own kind.
-        if found.closed or loops.coordinates.size or start > singular - beside or len(passed) == _MOST_PASSED:
+        if found.closed or loops.coordinates.size or len(passed) == _MOST_PASSED:
             break
         ends = (singular - beside, singular + beside)
         before = state_at(loops, target, start, begun, ends[0])
-        after = _continued(loops, before, ends)
+        after = _continued(loops, before, ends) if before.q.size else None
         if after is None:
             break
         inside = grid[keep & (grid > ends[0]) & (grid <= ends[1])]
@@ -226,5 +242,7 @@ class ExactMotion(Brief):
         # The motion does not start from samples near a change point.
         while k > 0 and any(abs(times[k] - one) <= beside for one in self.passed):
             k -= 1
-        given = np.array([times[k], t]), np.array([False, True])
+        # Where loops close in spite of a change point nearby, accelerations are rounding: the motion goes on beyond it.
+        beyond = [one + 2.0 * beside for one in self.passed if abs(one - t) <= beside]
+        given = np.array([times[k], t, *beyond]), np.array([False, True, *(False for _ in beyond)])
         return ExactState(*follow_past(self.loops, self.target, *given, self.solution.q[k], beside)[0].arrays[1:4])

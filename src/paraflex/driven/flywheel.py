@@ -69,11 +69,6 @@ def flywheel(motion: DrivenMotion, fluctuation: float) -> Flywheel:
             remedy="leave it out, or drive a joint that turns without limits",
         )  # fmt: skip
     torque = drive_torques(motion.system, motion.solution.multipliers)[:, 0]
-    if motion.passed and np.isnan(torque).any() and not np.isnan(torque).all():
-        raise InputError(
-            "a sample is at a change point, where forces have no value", field="samples", value=torque.size,
-            remedy="give another number",
-        )  # fmt: skip
     if np.isnan(torque).any():
         raise InputError("the motion has no loads", field="motion", remedy="compute it by torques, with masses")
     if abs(torque[-1] - torque[0]) > _REPEATED * float(np.max(np.abs(torque))):

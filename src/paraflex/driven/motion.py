@@ -2,7 +2,7 @@
 
 import math
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, ClassVar
@@ -12,15 +12,13 @@ import numpy as np
 from paraflex.actuation import allocate, required_effort
 from paraflex.arguments import checked_arguments, named_in_errors
 from paraflex.arrays import Array
-from paraflex.dynamics import System, build_system, dependence, joint_coordinate, reference_pose, still_signals
+from paraflex.dynamics import System, build_system, reference_pose, still_signals
 from paraflex.dynamics.joint_coordinates import joint_value, value_text
 from paraflex.dynamics.load_values import check_laws
-from paraflex.dynamics.stiffness import RestingForces
 from paraflex.errors import AssemblyError, InputError, UnreachablePathError
 from paraflex.findings import Finding
 from paraflex.formatting import quantity
 from paraflex.integrators import Solution, check_times
-from paraflex.kernel.bodies import stored_energy
 from paraflex.kernel.constraints import constraint_values
 from paraflex.kernel.packed import make_scratch
 from paraflex.limits import solvable
@@ -32,14 +30,13 @@ from paraflex.paths.closure import PathClosure
 from paraflex.paths.loops import LoopClosure
 from paraflex.validity import large_rotations, shared_loads
 from .assemblies import FoundAssembly, assemblies_of
-from .exact import Drive, ExactMotion
+from .exact import Drive, ExactMotion, Held
 from .features import KinematicFeatures, features_of
+from .loads import with_limits, with_loads
 from .ranges import Wish, check_determined, chosen_drive, driven_loops, followed, freedoms_at, ranged
 
 # Samples between which properties are located: of a drive, and at most for other motions.
 _FINE, _FINEST = 361, 1441
-# Singular values below this part of the largest leave forces undetermined.
-_SINGULAR = 1e-9
 
 
 @named_in_errors("a driven motion", "the motion that kinematics returns")
@@ -97,10 +94,11 @@ class DrivenMotion(MotionRun):
     def exact(self) -> ExactMotion:
         """The motion at any time, exact to rounding: over one turn of the drive, with samples of its own."""
         drive, solution = self.drive, self.solution
-        if drive is not None and drive.turns > 1.0:
+        one_turn = drive is not None and drive.alone
+        if one_turn and drive is not None and drive.turns > 1.0:
             drive = replace(drive, end=drive.start + math.copysign(2.0 * math.pi, drive.end - drive.start))
         end = float(solution.t[-1]) if drive is None else drive.duration
-        times = np.linspace(0.0, end, _FINE if drive is not None else int(np.clip(solution.t.size, _FINE, _FINEST)))
+        times = np.linspace(0.0, end, _FINE if one_turn else int(np.clip(solution.t.size, _FINE, _FINEST)))
         passed, rigid = self.passed, self.rigid
         if times.size != solution.t.size or times[-1] != solution.t[-1]:
             if rigid is None:
@@ -128,7 +126,7 @@ def kinematics(
     mechanism: Mechanism | ModelWithPaths,
     drive: str | None = None,
     *,
-    held: Mapping[str, float] | None = None,
+    held: Held | None = None,
     path: Path | str | None = None,
     start: float | None = None,
     end: float | None = None,
@@ -148,8 +146,9 @@ def kinematics(
     drive : str, optional
         Joint that moves at constant speed. By default the mechanism's prescribed motions act. If they leave degrees of
         freedom open, the end-effector follows the model's path, or else the joint of the only motor moves.
-    held : mapping of str to float, optional
-        Other joints, which are held at an angle [rad] or travel [m], if there are several degrees of freedom.
+    held : mapping of str to float, or to a pair of float, optional
+        Other joints, which are held at an angle [rad] or travel [m], if there are several degrees of freedom. With a
+        pair a joint moves from the first to the second in the time of the drive, at constant speed.
     path : Path or str, optional
         Path of the end-effector, or for a model the name of one.
     start, end : float, optional
@@ -232,7 +231,7 @@ def _ranged(
     near, closed = poses
     fixed = wish.end is not None or wish.duration is not None
     try:
-        return *ranged(mechanism, law, near, freedoms, fixed=fixed), ""
+        return *ranged(mechanism, law, near, freedoms, system, fixed=fixed), ""
     except UnreachablePathError:
         raise
     except AssemblyError as error:
@@ -243,7 +242,8 @@ def _ranged(
     # The assembly's angle of the drive is approximate: another joint's may be nearer.
     again = chosen_drive(mechanism, wish, freedoms, system, closed)
     assert again is not None
-    return *ranged(mechanism, again, closed, freedoms, fixed=fixed), f"at {value_text(system, law.joint, closed)}"
+    found = ranged(mechanism, again, closed, freedoms, system, fixed=fixed)
+    return *found, f"at {value_text(system, law.joint, closed)}"
 
 
 def _path(
@@ -292,7 +292,7 @@ def torques(
     mechanism: Mechanism | ModelWithPaths,
     drive: str | None = None,
     *,
-    held: Mapping[str, float] | None = None,
+    held: Held | None = None,
     path: Path | str | None = None,
     mode: str | ActuationMode | None = None,
     start: float | None = None,
@@ -345,8 +345,12 @@ def torques(
         remedy = "leave it out, or follow a path"
         raise InputError("has no effect without a path", field="mode", value=mode, remedy=remedy)
     solution = with_loads(motion.system, motion.solution, effort)
-    notes = (*motion.notes, *shared_loads(motion.system, solution))
-    return replace(motion, solution=solution, effort=effort, mode=name, notes=notes)
+    notes = [*motion.notes, *shared_loads(motion.system, solution)]
+    if motion.passed:
+        exact = ExactMotion(motion.system, motion.solution, motion.drive, motion.loops, passed=motion.passed)
+        solution, unbounded = with_limits(exact, solution)
+        notes += unbounded
+    return replace(motion, solution=solution, effort=effort, mode=name, notes=tuple(notes))
 
 
 def _solution(system: System, arrays: tuple[Array, ...], began: float) -> Solution:
@@ -363,28 +367,3 @@ def _solution(system: System, arrays: tuple[Array, ...], began: float) -> Soluti
         constraint_position_max=float(np.max(np.abs(gaps[0]))), constraint_velocity_max=float(np.max(np.abs(gaps[1]))),
         wall_time=time.perf_counter() - began,
     )  # fmt: skip
-
-
-def with_loads(system: System, solution: Solution, effort: Array) -> Solution:
-    """Return a solution with the multipliers that its motion requires under torques of motors, and energies.
-
-    Phi_q^T lambda = -(M a + h - loads), with the multipliers of springs, dampers and friction from their laws, of least
-    norm where constraints depend on one another. At change points, where they are not determined, all are NaN.
-    """
-    forces, held = RestingForces(system, 0.0, beams=True), np.flatnonzero(system.constrained)
-    forces.signals = still_signals(system.mechanism, float(solution.t[-1]))[0]
-    motors = [motor.joint for motor in system.mechanism.motors]
-    pushed = [joint_coordinate(system, joint, solution.q).rows for joint in motors]
-    scratch, ranks = make_scratch(system.packed), np.zeros(solution.t.size)
-    multipliers, energies = np.zeros(solution.multipliers.shape), np.zeros((solution.t.size, 2))
-    for k, (t, q, v, a) in enumerate(zip(solution.t, solution.q, solution.v, solution.a, strict=True)):
-        forces.time, forces.v, forces.a = float(t), v, a
-        lam = forces.compliant(q)
-        left = forces(q, lam)[0] - sum(torque * rows[k] for torque, rows in zip(effort[k], pushed, strict=True))
-        rows = system.dimensionless_jacobian(q)[held].T
-        found, _, ranks[k], _ = np.linalg.lstsq(rows, left * system.units, rcond=_SINGULAR)
-        lam[held] = -found / system.row_units[held]
-        multipliers[k] = lam if ranks[k] == held.size else dependence(system, q).least_norm(lam)
-        energies[k] = stored_energy(system.packed, q, v, lam, scratch)[:2]
-    multipliers[ranks < np.max(ranks)] = np.nan
-    return replace(solution, multipliers=multipliers, kinetic_energy=energies[:, 0], strain_energy=energies[:, 1])

@@ -1,7 +1,7 @@
 """Drive of a mechanism: the joint, its range, which ends at limits of reach, and the motion through it."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -12,12 +12,12 @@ from paraflex.dynamics import System, assembled_position
 from paraflex.dynamics.joint_coordinates import joint_value, value_text
 from paraflex.dynamics.soundness import mobility
 from paraflex.dynamics.state import State
-from paraflex.errors import InputError, Moment, UnreachablePathError, listed
+from paraflex.errors import AssemblyError, InputError, Moment, UnreachablePathError, listed
 from paraflex.formatting import quantity
 from paraflex.mechanism import Assembly, ConstantSpeed, Mechanism, PrescribedAngle
 from paraflex.mechanism.quantities import finite, known
 from paraflex.paths.loops import LoopClosure, no_long_steps
-from .exact import NO_TASKS, Drive, follow_past, no_target, width_beside
+from .exact import AT, NO_TASKS, Drive, Held, follow_past, no_target, width_beside
 from .limits import limit_of_reach
 
 # Fraction of the range between two limits of reach that is left out at either limit, where rates grow without bound.
@@ -30,6 +30,8 @@ _SLOWEST = 1e-12
 _MOST_TURNS = 20.0
 # Longest step of a drive as a fraction of a turn, or of its travel.
 _STEP = 1.0 / 360.0
+# Smallest singular value of the constraints, relative to the largest, at which a motion ends beside a change point.
+_NEAR = 1e-2
 _GIVE_RANGE = "give the start and end of its travel"
 
 
@@ -46,7 +48,7 @@ class Wish(NamedTuple):
     """Arguments of a motion: see `kinematics`."""
 
     drive: str | None
-    held: Mapping[str, float]
+    held: Held
     start: float | None
     end: float | None
     speed: float | None
@@ -63,7 +65,8 @@ def chosen_drive(mechanism: Mechanism, wish: Wish, freedoms: int, system: System
     joint, prescribed = wish.drive, mechanism.prescribed
     for held, value in wish.held.items():
         _check_joint(mechanism, held, "held")
-        finite(value, f"held.{held}")
+        for each in value if isinstance(value, tuple) else (value,):
+            finite(each, f"held.{held}")
     steady = [one for one in prescribed if isinstance(one.profile, ConstantSpeed) and one.joint not in wish.held]
     if joint is None and (len(steady) != 1 or len(prescribed) != 1):
         moving = [one.name for one in mechanism.joints if one.moves and one.name not in wish.held]
@@ -196,18 +199,28 @@ def _with_drive(mechanism: Mechanism, law: Drive, freedoms: int) -> Mechanism:
     drive = PrescribedAngle if law.joint in names else JointDrive
     taken = {one.name for one in others}
     held = tuple(
-        JointDrive(joint if joint not in taken else f"{joint} held", joint, ConstantSpeed(value, 0.0))
-        for joint, value in law.held.items()
-    )
+        JointDrive(joint if joint not in taken else f"{joint} held", joint,
+                   ConstantSpeed(first, (last - first) / law.duration if last != first else 0.0))
+        for joint, (first, last) in law.ends_of_others.items()
+    )  # fmt: skip
     return replace(mechanism, prescribed=(drive(law.name, law.joint, law.profile), *held, *others))
 
 
 def ranged(
-    mechanism: Mechanism, law: Drive, pose: Array, freedoms: int, *, fixed: bool
+    mechanism: Mechanism, law: Drive, pose: Array, freedoms: int, system: System, *, fixed: bool
 ) -> tuple[LoopClosure, Array, Drive]:
     """Return closure, first pose and drive; without a given end the range is a turn or lies between two limits."""
-    loops, pose = driven_loops(_with_drive(mechanism, law, freedoms), pose, law.duration, freedoms)
-    if fixed or (stopped := _reached(loops, law, pose)) is None:
+    at_first = {joint: first for joint, (first, _) in law.ends_of_others.items()}
+    way = replace(law, start=joint_value(system, law.joint, pose), end=law.start, held=at_first)
+    try:
+        loops, pose = driven_loops(_with_drive(mechanism, law, freedoms), pose, law.duration, freedoms)
+    except AssemblyError:
+        if way.start == way.end:
+            raise
+        # A start beyond a change point is reached along the motion from the assembly.
+        there, pose = driven_loops(_with_drive(mechanism, way, freedoms), pose, way.duration, freedoms)
+        loops, pose = _closure(mechanism, law, freedoms), _last_pose(there, way, pose)
+    if fixed or not law.alone or (stopped := _reached(loops, law, pose)) is None:
         if not fixed and law.unit == "m":
             raise InputError(
                 "a joint that slides without a limit of reach", field="drive", value=law.joint, remedy=_GIVE_RANGE
@@ -224,12 +237,15 @@ def ranged(
     low, high = sorted(ends)
     reach, inside = (low, high), _MARGIN * (high - low)
     span = (low + inside, high - inside) if law.end > law.start else (high - inside, low + inside)
-    back = replace(law, end=span[0])
     if span[0] != law.start:
-        there = _closure(mechanism, back, freedoms)
-        pose = followed(there, np.array([0.0, back.duration]), pose, back)[0][1][-1]
+        back = replace(law, end=span[0])
+        pose = _last_pose(_closure(mechanism, back, freedoms), back, pose)
     law = replace(law, start=span[0], end=span[1], reach=reach)
     return _closure(mechanism, law, freedoms), pose, law
+
+
+def _last_pose(loops: LoopClosure, law: Drive, pose: Array) -> Array:
+    return followed(loops, np.array([0.0, law.duration]), pose, law)[0][1][-1]
 
 
 def _closure(mechanism: Mechanism, law: Drive, freedoms: int) -> LoopClosure:
@@ -251,9 +267,17 @@ def followed(
     grid, keep = times, np.ones(times.size, dtype=bool)
     if law is not None:
         grid, keep = no_long_steps(times, _STEP * law.duration / max(law.turns, 1.0))
-    found, passed = follow_past(loops, no_target, grid, keep, pose, width_beside(law, float(times[-1])))
+    beside = width_beside(law, float(times[-1]))
+    found, passed = follow_past(loops, no_target, grid, keep, pose, beside)
     if not found.closed:
         raise _barred(law, loops, found.last, found.stopped)
+    sizes = np.linalg.svd(loops.system.dimensionless_jacobian(found.last), compute_uv=False)
+    if law is not None and sizes[-1] < _NEAR * sizes[0]:
+        # Accelerations at the end are rounding errors, unless the motion beyond a change point tells them.
+        beyond = np.append(grid, grid[-1] + 2.0 * beside), np.append(keep, False)
+        more, later = follow_past(loops, no_target, *beyond, pose, beside)
+        if more.closed:
+            found, passed = more, [t for t in later if t <= times[-1] + AT * beside]
     return found.arrays[:4], tuple(passed)
 
 
@@ -262,7 +286,7 @@ def _barred(law: Drive | None, loops: LoopClosure, last: Array | None, stopped: 
     system = loops.system
     q = last if last is not None else np.zeros(system.n)
     drives = ", ".join(f"{one.joint} at {value_text(system, one.joint, q)}" for one in system.mechanism.prescribed)
-    limit = limit_of_reach(system, law.joint, q) if law is not None and last is not None else None
+    limit = limit_of_reach(system, law.joint, q) if law is not None and law.alone and last is not None else None
     if limit is not None and law is not None:
         cause = f"{law.joint} reaches its limit of reach, {quantity(limit, law.unit, digits=6)},"
     else:

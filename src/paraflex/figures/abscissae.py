@@ -86,6 +86,8 @@ def find_abscissa(data: xr.Dataset, name: str, field: str = "over") -> Abscissa:
     if name not in found:
         problem = "no joint or coordinate of a point with this name in these results"
         remedy = f'write "{name}.x" or "{name}.y"' if f"{name}.x" in found else suggestion(name, moving)
+        if (owner := name.rpartition(".")[0]) in found:
+            remedy = f'write "{owner}", the coordinate of the joint'
         raise InputError(problem, field=field, value=name, remedy=remedy)
     if not found[name].moves:
         raise InputError("does not move in these results", field=field, value=name, remedy=f"one of {listed(moving)}")

@@ -84,7 +84,7 @@ def units_at(schema: type[BaseModel], data: Mapping[str, Any], place: Place) -> 
     if place[0] in _OF_ANY_UNIT or "unit of" in found.description:
         return None
     if "table" in place and place[-1] == 0 and (over := value_at(data, (*place[:2], "over"))) is not None:
-        unit = UNITS_OF_QUANTITIES.get(over.rpartition(".")[2].rstrip("'")) if _is_quantity(over) else None
+        unit = unit_over(over)
         return None if unit is None else (unit,)
     units = _units_in(found.description, _row(data, place), place[-1])
     if place[0] == "gear" and place[-1] == "ratio":
@@ -96,12 +96,21 @@ def units_at(schema: type[BaseModel], data: Mapping[str, Any], place: Place) -> 
     return tuple(dict.fromkeys(other.get(unit, unit) for unit in units))
 
 
-def _is_quantity(over: Any) -> bool:
-    """Check whether the text of `over` is a quantity of the motion alone."""
+def unit_over(over: Any) -> str | None:
+    """Return the SI unit of the quantity in the text of `over`; None if it is not one quantity of a known unit."""
     try:
-        return isinstance(over, str) and quantity_in(tree_of(over)) is not None
+        alone = isinstance(over, str) and quantity_in(tree_of(over)) is not None
     except ExpressionError:
-        return False
+        alone = False
+    return UNITS_OF_QUANTITIES.get(over.rpartition(".")[2].rstrip("'")) if alone else None
+
+
+def described(found: FileField, data: Mapping[str, Any], place: Sequence[Any]) -> str:
+    """Return the description of the field at a place; a table over a quantity has it and its unit, not the time."""
+    over = value_at(data, (*place[:2], "over")) if "table" in place else None
+    if over is None:
+        return found.description
+    return found.description.replace("[t,", f"[{over},").replace(" in s", f" in {unit_over(over) or 'SI units'}", 1)
 
 
 def check_units(schema: type[BaseModel], data: Mapping[str, Any]) -> None:
@@ -121,7 +130,7 @@ def check_units(schema: type[BaseModel], data: Mapping[str, Any]) -> None:
         found = field_at(schema, data, place)
         if takes_number(found.annotation) and text not in _words_of(found.annotation):
             units = units_at(schema, data, place)
-            check_unit(text, parameters, units, ".".join(map(str, place)), found.description)
+            check_unit(text, parameters, units, ".".join(map(str, place)), described(found, data, place))
 
 
 def check_unit(
@@ -159,7 +168,8 @@ def check_unit(
         remedy += f"; it depends on {', '.join(f'parameters.{name}' for name in named)}"
     # The dimensions differ in the angle only, as for a period computed from a speed, 2 * pi / n.
     if any(given[:3] == unit_named(unit).dimension[:3] for unit in units or ()):
-        remedy += '; an angle has a dimension of its own: the period of a speed n in rpm is "1 rev / n"'
+        remedy += "; an angle has a dimension of its own: "
+        remedy += 'write "60 rpm"' if "rad/s" in (units or ()) else 'the period of a speed n in rpm is "1 rev / n"'
     raise InputError(
         f"a quantity in {dimension_text(given)} where {expected} is asked for", field=field, value=text, remedy=remedy
     )

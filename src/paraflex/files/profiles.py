@@ -11,7 +11,8 @@ from paraflex.errors import InputError, renamed
 from paraflex.expressions.evaluate import check_in_time, evaluate, evaluate_in_time, expressed_in, is_constant, names_in
 from paraflex.mechanism import ConstantSpeed, ForceLaw, PiecewiseProfile, SpeedProfile, TabulatedProfile, TimeProfile
 from paraflex.mechanism.loads import InMotion
-from paraflex.mechanism.profiles import Interpolation, Values
+from paraflex.mechanism.profiles import Interpolation, Values, check_ascending
+from .fields import unit_over
 from .schema import PieceTable, PrescribedTable
 
 # Number of times at which a profile is evaluated as a check when it is read.
@@ -224,6 +225,8 @@ def read_components(
         raise InputError(
             "is for tables only", field="over", value=over, remedy=f"write the {quantity} as an expression"
         )
+    if over is not None:
+        check_ascending([row[0] for row in entry.table], f"values of {over}", unit_over(over) or "")
     components = tuple(map(_number_if_constant, _profiles(entry, parameters)))
     if over is not None:
         # A column of one number is no law.

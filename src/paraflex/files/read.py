@@ -14,7 +14,7 @@ from pydantic import BaseModel, ValidationError
 from paraflex.errors import InputError, suggestion
 from paraflex.expressions.evaluate import evaluate_parameters
 from paraflex.limits import FILE_BYTES, KEY_PARTS, NAME_LETTERS
-from .fields import check_units, field_at
+from .fields import check_units, described, field_at
 
 # Patterns of numbers with a decimal comma, of unquoted values that TOML does not allow, and of strings and comments,
 # whose brackets are ignored.
@@ -50,7 +50,8 @@ def read_text(path: Path) -> str:
     InputError
         Unreadable file; see `text_of`.
     """
-    return text_of(path, "file", None, unread="check its name", wrong="name a TOML file")
+    unread = "name a TOML file, not a folder" if path.is_dir() else "check its name"
+    return text_of(path, "file", None, unread=unread, wrong="name a TOML file")
 
 
 def text_of(path: Path, field: str, name: str | None, *, unread: str, wrong: str) -> str:
@@ -218,7 +219,7 @@ def _first_problem(schema: type[BaseModel], data: dict[str, Any], error: Validat
     location = _fields(schema, data, problem)
     field = ".".join(str(part) for part in location)
     place = field_at(schema, data, location)
-    model, description = place.owner, place.description
+    model, description = place.owner, described(place, data, location)
     kind, value = problem["type"], problem.get("input")
     if kind == "missing":
         return InputError("is missing", field=field, remedy=f"give {description}")

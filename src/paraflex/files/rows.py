@@ -14,7 +14,7 @@ from typing import Any
 
 from paraflex.errors import InputError
 from paraflex.units import dimension_text, unit_named, unit_of, unknown_unit
-from .fields import Place, units_at
+from .fields import Place, unit_over, units_at, value_at
 from .outside import check_outside, is_outside
 from .overlay import overlaid
 from .read import text_of
@@ -137,9 +137,11 @@ def _rows_of(
         if row is None and not rows and headings is None and not any(map(_is_number, _SEPARATOR.split(line.strip()))):
             headings = line
         elif row is None:
+            over = value_at(data, (*place, "over"))
+            first = "a time in s" if over is None else f"{over} in {unit_over(over) or 'SI units'}"
             raise InputError(
                 f"line {number} of {name} is not {count} numbers", field=field, value=line.strip(),
-                remedy=f"give {_VALUES[columns]} in every line below the headings",
+                remedy=f"give {_VALUES[columns].replace('a time in s', first)} in every line below the headings",
             )  # fmt: skip
         else:
             rows.append(row)

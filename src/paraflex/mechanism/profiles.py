@@ -1,6 +1,6 @@
 """Profiles of prescribed motions, loads and torques in time: functions, constant speed, pieces and tables."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from enum import Enum
 from functools import cached_property
@@ -215,6 +215,14 @@ class PiecewiseProfile(CheckedFields):
         return out[0], out[1], out[2]
 
 
+def check_ascending(column: Sequence[float], what: str = "times", unit: str = "s") -> None:
+    """Check that the first column of a table ascends, and name its quantity in the error."""
+    for row, (before, after) in enumerate(pairwise(column), start=2):
+        if not after > before:
+            problem = f"its {what} must ascend, but row {row} does not"
+            raise InputError(problem, field="table", value=after, remedy=f"it follows {before:g} {unit}".strip())
+
+
 class Interpolation(Enum):
     """Interpolation of a table: a quintic spline with four continuous derivatives, or straight lines."""
 
@@ -252,18 +260,11 @@ class TabulatedProfile(CheckedFields):
     def __post_init__(self) -> None:
         super().__post_init__()
         if len(self.times) < 2 or len(self.times) != len(self.values):
-            raise InputError(
-                "a table needs two rows", field="table", value=len(self.times), remedy="give at least 2 of [t, value]"
-            )
+            raise InputError("a table needs two rows", field="table", value=len(self.times), remedy="give at least two")
         for row in zip(self.times, self.values, strict=True):
             if not np.all(np.isfinite(row)):
                 raise InputError("not a finite number", field="table", value=row, remedy="give times and values")
-        for row, (before, after) in enumerate(pairwise(self.times), start=2):
-            if not after > before:
-                raise InputError(
-                    f"its times must ascend, but row {row} does not", field="table", value=after,
-                    remedy=f"it follows t = {before:g} s",
-                )  # fmt: skip
+        check_ascending(self.times)
 
     @cached_property
     def _spline(self) -> "scipy.interpolate.BSpline":

@@ -103,11 +103,11 @@ class LoopClosure:
         pose : (n,) array
             Pose near the first instant.
         """
-        intervals, shortest = [], _SHORTEST_STEP * min(1.0, float(grid[-1] - grid[0]) or 1.0)
+        intervals, shortest = [], _SHORTEST_STEP * min(1.0, abs(float(grid[-1] - grid[0])) or 1.0)
         while True:
             status, index, found = self.run(grid, target(grid), pose)
             last = index - 1
-            if status in (LOOPS_CLOSED, LOOPS_SINGULAR) or last < 0 or grid[index] - grid[last] < shortest:
+            if status in (LOOPS_CLOSED, LOOPS_SINGULAR) or last < 0 or abs(grid[index] - grid[last]) < shortest:
                 break
             # Continue from the last instant reached, in shorter steps.
             intervals.append([x[:last][keep[:last]] for x in (grid, *found)])

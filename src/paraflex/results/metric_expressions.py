@@ -5,6 +5,7 @@ derivative of a run with a complex step; the values alone decide where a maximum
 """
 
 import ast
+import re
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import lru_cache, partial
@@ -13,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 
 from paraflex.arrays import Indices
-from paraflex.errors import InputError, suggestion
+from paraflex.errors import suggestion
 from paraflex.expressions.dimensions import dimension_in
 from paraflex.expressions.evaluate import CONSTANTS, NO_EXPRESSION, ExpressionError, arithmetic, names_within, tree_of
 from paraflex.expressions.jets import FUNCTIONS, Jet, sqrt
@@ -70,21 +71,22 @@ class _Window(NamedTuple):
             raise ExpressionError("a window that ends before it begins", "write it like [0.2:0.5], in s")
         return found
 
+    def __str__(self) -> str:
+        return f"[{':'.join(f'{one:g}' if np.isfinite(one) else '' for one in self)}]"
+
+    def check(self, last: float) -> None:
+        """Check that the window lies within a run that ends at a time [s]."""
+        if any(one > last * (1.0 + SAME_TIME) for one in self if np.isfinite(one)):
+            problem = f"the window {self} is not within the run, from 0 s to {last:g} s"
+            raise ExpressionError(problem, "choose another, or leave out an end")
+
     def samples(self, t: Jet) -> Indices:
         """Return the indices of the samples in the window."""
-        times, given = t.value, [one for one in self if np.isfinite(one)]
-        near = SAME_TIME * float(np.ptp(times)) if times.size else 0.0
-        first, last = (float(times[0]), float(times[-1])) if times.size else (0.0, 0.0)
-        problem = ""
-        if any(not first - near <= one <= last + near for one in given):
-            problem = f"the window is not within the run, from {first:g} s to {last:g} s"
-        found = np.flatnonzero((times >= self.start - near) & (times <= self.end + near))
+        times, last = t.value, float(np.max(t.value, initial=0.0))
+        self.check(last)
+        found = np.flatnonzero((times >= self.start - SAME_TIME * last) & (times <= self.end + SAME_TIME * last))
         if not found.size:
-            problem = problem or "no sample lies in the window"
-        if problem:
-            written = ":".join(f"{one:g}" if np.isfinite(one) else "" for one in self)
-            remedy = "choose another, leave out an end, or take more samples"
-            raise InputError(problem, field="metrics", value=f"[{written}]", remedy=remedy)
+            raise ExpressionError(f"no sample lies in the window {self}", "choose a longer one, or take more samples")
         return found
 
 
@@ -184,11 +186,11 @@ class MetricExpression:
         """Whether the metric depends on the times of the samples."""
         return any(call.in_time for call in self.calls.values())
 
-    @property
-    def until(self) -> float:
-        """Latest time that a window names [s]; 0 without windows."""
-        ends = [end for call in self.calls.values() for end in call.window or () if np.isfinite(end)]
-        return max(ends, default=0.0)
+    def check_windows(self, last: float) -> None:
+        """Check that all windows lie within a run that ends at a time [s]."""
+        for call in self.calls.values():
+            if call.window is not None:
+                call.window.check(last)
 
     @property
     def quantities(self) -> list[str]:
@@ -253,6 +255,11 @@ class MetricExpression:
         return dimension_in(tree, of)
 
 
+def dotted_names(text: str) -> list[str]:
+    """Return the dotted names in the text of an expression that cannot be parsed, except for those in quotes."""
+    return re.findall(r"(?<![\w.'\"])[^\W\d]\w*(?:\.[^\W\d]\w*)+(?![\w.'\"])", text)
+
+
 @lru_cache(maxsize=512)
 def parsed(text: str) -> MetricExpression:
     """Parse the expression of a metric.
@@ -277,7 +284,7 @@ def parsed(text: str) -> MetricExpression:
                                                   for name, call in parser.calls.items()}  # fmt: skip
     MetricExpression(tree, whole).value(lambda _: ones, lambda: ones)
     if not any(call.window for call in parser.calls.values()) or parser.is_series(tree):
-        name = next((name for name in _quantities(tree) if "." in name[1:]), "body.point.y")
+        name = next(iter(dotted_names(text)), "body.point.y")
         raise ExpressionError("not one number of a run", f"write max(abs({name})), or with another of "
                               f"{', '.join(REDUCTIONS)}")  # fmt: skip
     return MetricExpression(tree, parser.calls)

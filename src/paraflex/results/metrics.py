@@ -208,10 +208,13 @@ def _of_expression(text: str, run: Any, nominal: Any) -> Any:
         value = of(nominal, nominal) if np.iscomplexobj(here) else here
         return Jet(value, np.imag(here), np.zeros_like(value))
 
-    expression = members.expression(text)
-    found = expression.value(
-        lambda name: jet(members.quantity(name).of), lambda: jet(lambda traces, _: traces.solution.t)
-    )
+    with expressed_in("metrics", text):
+        expression = members.expression(text)
+        jets = {name: jet(members.quantity(name).of) for name in expression.quantities}
+        found = expression.value(jets.__getitem__, lambda: jet(lambda traces, _: traces.solution.t))
+        if not np.isfinite(found.value) and all(np.isfinite(one.value).any() for one in jets.values()):
+            raise ExpressionError("not a finite number", "it divides by zero, or takes samples without a value: "
+                                  "max and min leave them out, a window does")  # fmt: skip
     return found.value + 1j * found.rate if np.any(found.rate) else found.value
 
 
@@ -244,11 +247,6 @@ def kept_metrics(data: xr.Dataset, run: str = "") -> dict[str, Any]:
     """Return `metrics` with what `keep_metrics` stored of a run; empty if nothing was stored."""
     found = json.loads(data.attrs.get("metrics", "{}")).get(run)
     return {"metrics": found} if found else {}
-
-
-def metric_until(name: str) -> float:
-    """Return the latest time that the windows of a metric by expression name [s]; 0 for other metrics."""
-    return parsed(name).until if "(" in name else 0.0
 
 
 def has_loads(name: str, mechanism: Mechanism) -> bool:

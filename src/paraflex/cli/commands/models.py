@@ -3,7 +3,7 @@
 from dataclasses import dataclass, field
 from typing import ClassVar
 
-from .options import FilesChoice, ModelChoice, assembly_option, json_switch, path_option
+from .options import FilesChoice, ModelChoice, NamedChoice, assembly_option, json_switch, path_option
 from .requests import argument, option, repeatable, switch
 
 
@@ -154,11 +154,11 @@ class StaticsRequest:
 class KinematicsRequest:
     """Options of `paraflex kinematics`."""
 
-    model: ModelChoice = field(default_factory=ModelChoice)
+    model: NamedChoice = field(default_factory=NamedChoice)
     drive: list[str] = repeatable(
         "--drive JOINT[=VALUE]",
-        "Joint that moves at constant speed, or one held at a value; repeatable. Default: the prescribed motions, the "
-        "path, or the only motor's joint.",
+        "Joint that moves at constant speed, or one held at a value, or that moves meanwhile, JOINT=FIRST:LAST; "
+        "repeatable. Default: the prescribed motions, the path, or the only motor's joint.",
     )
     path: str | None = path_option()
     start: str | None = option(

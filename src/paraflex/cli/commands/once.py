@@ -14,8 +14,16 @@ class Command(TyperCommand):
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
         """Parse arguments as every command does, after a check for options given twice."""
         if not ctx.resilient_parsing:  # set during completion, when the line is incomplete
+            self._refuse_single_dashes(args)
             self._refuse_second_values(ctx, list(args))
         return super().parse_args(ctx, args)
+
+    def _refuse_single_dashes(self, args: list[str]) -> None:
+        known = {flag for option in self.params for flag in (*option.opts, *option.secondary_opts)}
+        for word in args:
+            flag = f"-{word.partition('=')[0]}"
+            if flag in known and not word.startswith("--") and len(word) > 2:
+                raise InputError("one dash", field=word, remedy=f"did you mean {flag}?")
 
     def _refuse_second_values(self, ctx: Any, args: list[str]) -> None:
         twin = copy.copy(self)

@@ -78,6 +78,15 @@ class ModelChoice:
 
 
 @dataclass(frozen=True)
+class NamedChoice(ModelChoice):
+    """Choice of a model; there is no default."""
+
+    source: str | None = argument(
+        "NAME|FILE", "A library mechanism or a TOML file. Without one: list what can be run.", default=None
+    )
+
+
+@dataclass(frozen=True)
 class PlanChoice:
     """Options passed to `Model.plan`; None takes the model's value."""
 

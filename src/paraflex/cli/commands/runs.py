@@ -6,6 +6,7 @@ from .options import (
     DrawnChoice,
     FramesChoice,
     ModelChoice,
+    NamedChoice,
     PlanChoice,
     json_switch,
     method_option,
@@ -13,23 +14,14 @@ from .options import (
     replace_switch,
     tolerance_option,
 )
-from .requests import argument, option, repeatable, switch
-
-
-@dataclass(frozen=True)
-class RunChoice(ModelChoice):
-    """Choice of the model to run; there is no default."""
-
-    source: str | None = argument(
-        "NAME|FILE", "A library mechanism or a TOML file. Without one: list what can be run.", default=None
-    )
+from .requests import option, repeatable, switch
 
 
 @dataclass(frozen=True, kw_only=True)
 class RunRequest:
     """Options of `paraflex run`; None stands for the default of the model or the program."""
 
-    model: RunChoice = field(default_factory=RunChoice)
+    model: NamedChoice = field(default_factory=NamedChoice)
     paths: list[str] = repeatable(
         "--path NAME|FILE",
         "A path of the model or a TOML file with one; repeatable: each is run in all modes, into a folder of its name "

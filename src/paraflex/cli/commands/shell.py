@@ -3,13 +3,15 @@
 The module of the function is imported only when the command is called.
 """
 
-from contextlib import AbstractContextManager, nullcontext
+from collections.abc import Iterator
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from importlib import import_module
 from typing import Any, NamedTuple
 
 import typer
 
 from paraflex.cli.signals import exit_code, is_taken, raised
+from paraflex.errors import InputError
 from . import models, results, runs, studies
 
 
@@ -29,7 +31,7 @@ class ListedCommand(NamedTuple):
         module, _, function = self.function.partition(".")
         do = getattr(import_module(f"paraflex.cli.{module}"), function)
         try:
-            with raised(), _outside(request):
+            with raised(), _outside(request), _in_file(request):
                 return do(request)
         except BaseException as error:
             # An interrupted library may raise an error of its own instead.
@@ -54,8 +56,20 @@ def _outside(request: Any) -> AbstractContextManager[None]:
     return allowing_outside()
 
 
+@contextmanager
+def _in_file(request: Any) -> Iterator[None]:
+    """Add the file of the requested model to errors of its mechanism, which does not know it."""
+    try:
+        yield
+    except InputError as error:
+        named = None if error.source else getattr(getattr(request, "model", None), "given", None)
+        raise (error.in_file(named) if named and error.field.startswith(_TABLES) else error) from error.__cause__
+
+
 # Groups of commands by name, with their help.
 GROUPS = {"control": "Sampled controllers of a model."}
+# Tables of model files in the fields of errors found after a model was read.
+_TABLES = ("body.", "load.", "linear_spring.")
 # Requests of studies that store every run, so that they can be continued.
 _STUDIES = (studies.SweepRequest, studies.SearchRequest, studies.IndicesRequest)
 # In the order of `paraflex --help`.

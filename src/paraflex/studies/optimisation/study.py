@@ -137,9 +137,6 @@ def base_study(table: StudyTable, folder: FilePath, columns: Mapping[str, str]) 
     """
     for name, entry in table.vary.items():
         _check_range(f"vary.{name}", entry)
-    for field, column in columns.items():
-        check_metric(column, field)
-    counting = [metric_of(column).name for column in columns.values()]
     sampling = SamplingTable(kind=RANDOM, number=1)
 
     def study(metrics: list[str]) -> SweepStudy:
@@ -147,10 +144,16 @@ def base_study(table: StudyTable, folder: FilePath, columns: Mapping[str, str]) 
 
     base = study(table.metrics)
     for field, column in columns.items():
+        check_metric(column, field, members=base.members)
         with renamed(field, only="metrics"):
             _check_column(field, column, base.members)
-    missing = [name for name in counting if name not in base.setting.metrics]
-    base = study([*(table.metrics or base.setting.metrics), *dict.fromkeys(missing)]) if missing else base
+    fields = {metric_of(column).name: field for field, column in columns.items()}
+    missing = [name for name in fields if name not in base.setting.metrics]
+    try:
+        base = study([*(table.metrics or base.setting.metrics), *missing]) if missing else base
+    except InputError as error:
+        at = fields.get(str(error.value))
+        raise (error if at is None else error.at(at)) from None
     start = [
         _start(base.setting, places, p, table.vary[p.name].start)
         for p, places in zip(base.parameters, base.setting.places, strict=True)
