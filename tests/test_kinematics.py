@@ -765,15 +765,15 @@ def test_the_commands_write_results_that_other_commands_take(rocker, tmp_path):
     assert all(one["force_max"] is None for one in summary["loads"]["joints"].values())
     assert summary["loads"]["drives"]["O"]["torque_max"] is None
     assert paraflex("plot", folder, "--out", tmp_path / "figures").returncode == 0
-    words = ("four_bar", "--speed", "100 rpm", "--drive", "O", "--fluctuation", "0.02", "--no-report")
-    done = paraflex("torques", *words, "--out", tmp_path / "torques")
-    drawn = {each.stem for each in tmp_path.glob("torques/figures/*")}
-    assert {"drive_efforts", "joint_forces", "frame_loads"} <= drawn
     for over, says in (("o", 'did you mean "O"?'), ("O.angle", 'write "O", the coordinate of the joint')):
         assert says in paraflex("plot", folder, "point_components", "--over", over).stderr
     done = paraflex("kinematics", "five_bar", "--drive", "A1=2.16:2", "--drive", "A2=1:57.3 deg", "--samples", "5")
     assert "A1 moves from 2.1600 rad to 2.0000 rad" in done.stdout
     assert "A2 moves from 1.0000 rad to 1.0001 rad in the same time" in done.stdout
+    words = ("four_bar", "--speed", "100 rpm", "--drive", "O", "--fluctuation", "0.02", "--no-report")
+    done = paraflex("torques", *words, "--out", tmp_path / "torques")
+    drawn = {each.stem for each in tmp_path.glob("torques/figures/*")}
+    assert {"drive_efforts", "joint_forces", "frame_loads"} <= drawn
     assert "flywheel for a fluctuation of 0.02: 0.0754 kg m^2" in done.stdout
 
 
