@@ -182,7 +182,7 @@ values = ["6 mm", "7 mm"]
     assert "[kN]" in page.read_text(encoding="utf-8")
     # So has what is made of the folder later.
     for given, wanted in (((), "kN"), (("--units", "N"), "N")):
-        drawn = ("plot", tmp_path / "s", "response_curves", "--format", "svg", "--svg-text")
+        drawn = ("plot", tmp_path / "s", "all", "--format", "svg", "--svg-text")
         for command in (("report", tmp_path / "s"), drawn, ("export", tmp_path / "s", "--to", "csv")):
             made = paraflex(*command, *given, "--force")
             assert made.returncode == 0, made.stderr

@@ -28,6 +28,8 @@ _OF_A_RUN = ("run", "design", "path", "mode", "status", "reason")
 _FIRST_COLUMNS, _LAST = ("run", "id", "design", "path", "mode"), ("status", "reason", "time_reached")
 # A metric whose relative change is smaller counts as constant.
 _NOT_VARIED = 1e-9
+# Smallest number of runs for a map over two parameters.
+_FEWEST = 4
 # Ratio of values from which the axis of a metric is logarithmic.
 _WIDE = 50.0
 _MARKS: tuple[Mark, ...] = ("dot", "square", "cross", "ring")
@@ -154,6 +156,11 @@ class DesignTable:
         """Parameters that vary among the runs; all of them if none varies."""
         spread = [name for name, values in self.parameters.items() if np.unique(values).size > 1]
         return spread or list(self.parameters)
+
+    @property
+    def spans_plane(self) -> bool:
+        """Whether two parameters or more vary, in enough runs of the first path and mode for a map over two of them."""
+        return len(self.varied) > 1 and any(one.run.size >= _FEWEST for one in list(self.series.values())[:1])
 
     def axis(self, name: str) -> Axis:
         """Return the axis of a parameter or metric."""

@@ -22,8 +22,6 @@ from .layout import ONE_COLUMN, TWO_COLUMNS, is_narrow, lay_out, panels
 _MOST_METRICS, _LINES, _BETWEEN = 3, 7, 4
 # Ratio of a metric's values above which its lines are at 1, 2 and 5 times powers of ten.
 _SPREAD = 20.0
-# Smallest number of runs for a map.
-_FEWEST = 4
 # End of the used part of the colour map: its light end is too light for labels on it.
 _LIGHTEST = 0.9
 
@@ -42,7 +40,7 @@ def response_map(table: DesignTable, metrics: Sequence[str] | None = None) -> Fi
     """
     names = table.varied
     series = list(table.series.values())
-    if len(names) < 2 or not series or series[0].run.size < _FEWEST:
+    if not table.spans_plane:
         raise InputError(
             "a map is over two parameters that vary", field="table", value=", ".join(names) or None,
             remedy="vary two of them, or draw response_curves",

@@ -164,7 +164,8 @@ def _of_modes(
 
 def _can_be_drawn(figure: CatalogueFigure, source: Source) -> bool:
     if figure.takes == "designs":
-        return source.designs is not None and bool(source.designs.series)
+        table = source.designs
+        return table is not None and (table.spans_plane if figure.name == "response_map" else bool(table.series))
     if figure.takes == "models":
         return prototype_pair(source.data) is not None
     return figure.can_show(source.data) and (figure.name != "mode_shapes" or _vibrates(source.data))
