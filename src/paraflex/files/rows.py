@@ -137,7 +137,7 @@ def _rows_of(
         if row is None and not rows and headings is None and not any(map(_is_number, _SEPARATOR.split(line.strip()))):
             headings = line
         elif row is None:
-            over = value_at(data, (*place, "over"))
+            over = value_at(data, (*place[:-1], "over"))
             first = "a time in s" if over is None else f"{over} in {unit_over(over) or 'SI units'}"
             raise InputError(
                 f"line {number} of {name} is not {count} numbers", field=field, value=line.strip(),
