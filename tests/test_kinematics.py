@@ -465,6 +465,8 @@ def test_a_parallelogram_turns_through_its_folded_poses_without_turning_its_coup
         rocker, crank = (data[name].sel(body=body) for body in ("rocker", "crank"))
         assert float(abs(rocker - crank).max()) < least, name
     assert [one.code for one in motion.findings] == ["special-pose"]
+    upward = pf.kinematics(PARALLELOGRAM, "O", start=-0.1, end=0.1, samples=samples)
+    assert upward.findings[0].text == "assemblies meet, a change point, with O at 0 rad"
     assert "3.14159 rad" in motion.findings[0].text or start > 3.0
     assert motion.features.trails["coupler.P"].crunodes == ()
 

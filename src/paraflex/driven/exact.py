@@ -1,7 +1,7 @@
 """Motion of a driven mechanism at any time, from the closure of its loops."""
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from typing import Any, NamedTuple
@@ -13,6 +13,8 @@ from paraflex.arrays import Array, Brief, Mask
 from paraflex.dynamics import System, build_system
 from paraflex.dynamics.soundness import Mobility, mobility
 from paraflex.dynamics.state import State
+from paraflex.errors import listed
+from paraflex.formatting import quantity
 from paraflex.integrators import Solution
 from paraflex.kernel.closure import LOOPS_CLOSED
 from paraflex.mechanism import ConstantSpeed
@@ -28,8 +30,10 @@ AT = 1e-3
 _SAME_BRANCH = 0.05
 # Singular value of constraints that depend on others, relative to the largest, and accuracy of a change point.
 _DEPENDENT = 1e-9
-# Change points that a motion may pass.
-_MOST_PASSED = 100
+# Part of the width about a change point to which its place is shown.
+_SHARP = 1e-6
+# Change points that a motion may pass, and those that a finding lists.
+_MOST_PASSED, _SHOWN = 100, 6
 Target = Callable[[Array], Array]
 # Values at which other joints are held, or between which they move [rad, m].
 Held = Mapping[str, float | tuple[float, float]]
@@ -44,6 +48,16 @@ def no_target(times: Array) -> Array:
 def width_beside(drive: "Drive | None", end: float) -> float:
     """Return the time before and after a change point over which a motion until `end` is interpolated [s]."""
     return _BESIDE * (2.0 * math.pi / drive.speed if drive is not None and drive.unit == "rad" else end)
+
+
+def placed(drive: "Drive | None", times: Sequence[float]) -> tuple[str, str]:
+    """Return the place of a finding on some times of a motion [s], and the values of the drive at these times."""
+    if drive is None:
+        return "drive", f"drives at t = {listed([f'{t:.6g}' for t in times], _SHOWN)} s"
+    # Errors of the times would be shown of a value of zero.
+    least = _SHARP * drive.speed * width_beside(drive, drive.duration)
+    values = [quantity(least * round(drive.at(t) / least), drive.unit, digits=6) for t in times]
+    return f"drive {drive.joint}", f"{drive.joint} at {listed(values, _SHOWN)}"
 
 
 class Start(NamedTuple):

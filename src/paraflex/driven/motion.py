@@ -17,7 +17,6 @@ from paraflex.dynamics.joint_coordinates import joint_value, value_text
 from paraflex.dynamics.load_values import check_laws
 from paraflex.errors import AssemblyError, InputError, UnreachablePathError
 from paraflex.findings import Finding
-from paraflex.formatting import quantity
 from paraflex.integrators import Solution, check_times
 from paraflex.kernel.constraints import constraint_values
 from paraflex.kernel.packed import make_scratch
@@ -30,7 +29,7 @@ from paraflex.paths.closure import PathClosure
 from paraflex.paths.loops import LoopClosure
 from paraflex.validity import large_rotations, shared_loads
 from .assemblies import FoundAssembly, assemblies_of
-from .exact import Drive, ExactMotion, Held, Start
+from .exact import Drive, ExactMotion, Held, Start, placed
 from .features import KinematicFeatures, features_of
 from .loads import with_limits, with_loads
 from .ranges import Wish, check_determined, chosen_drive, driven_loops, followed, freedoms_at, ranged
@@ -277,11 +276,10 @@ def _motion(
     system, still = build_system(mechanism), {motor.name: 0.0 for motor in mechanism.motors}
     effort = np.full((arrays[0].size, len(still)), np.nan)
     if passed:
-        where = "drives are" if law is None else f"{law.joint} is"
-        places = (f"t = {t:.6g} s" if law is None else quantity(law.at(t), law.unit, digits=6) for t in passed)
-        text = f"assemblies meet, a change point, where {where} at {', '.join(places)}"
+        place, where = placed(law, passed)
+        text = f"assemblies meet, a change point, with {where}"
         remedy = "the motion continues in the assembly whose velocities are continuous"
-        notes = [*notes, Finding("special-pose", "drive" if law is None else f"drive {law.joint}", text, remedy)]
+        notes = [*notes, Finding("special-pose", place, text, remedy)]
     solution = _solution(system, arrays, began)
     return DrivenMotion(
         system, arrays[0], still, solution, law, loops, effort, passed=passed, notes=tuple(notes), **more
