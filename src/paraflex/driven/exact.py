@@ -60,7 +60,7 @@ def placed(drive: "Drive | None", times: Sequence[float]) -> tuple[str, str]:
     return f"drive {drive.joint}", f"{drive.joint} at {listed(values, _SHOWN)}"
 
 
-class Start(NamedTuple):
+class FirstPose(NamedTuple):
     """First pose (n,) of a motion, and its velocities and accelerations if known, which tell assemblies apart."""
 
     q: Array
@@ -143,7 +143,7 @@ class Drive:
 
 
 def follow_past(
-    loops: LoopClosure, target: Target, grid: Array, keep: Mask, first: Start, beside: float
+    loops: LoopClosure, target: Target, grid: Array, keep: Mask, first: FirstPose, beside: float
 ) -> tuple[ClosedLoops, list[float]]:
     """Follow a motion as `LoopClosure.follow` does, and past change points, on the branch whose velocities continue.
 
@@ -281,5 +281,5 @@ class ExactMotion(Brief):
         beyond = [one + 2.0 * beside for one in self.passed if abs(one - t) <= beside]
         given = np.array([times[k], t, *beyond]), np.array([False, True, *(False for _ in beyond)])
         solution = self.solution
-        first = Start(solution.q[k], None if k else (solution.v[0], solution.a[0]))
+        first = FirstPose(solution.q[k], None if k else (solution.v[0], solution.a[0]))
         return ExactState(*follow_past(self.loops, self.target, *given, first, beside)[0].arrays[1:4])

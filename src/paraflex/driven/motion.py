@@ -29,7 +29,7 @@ from paraflex.paths.closure import PathClosure
 from paraflex.paths.loops import LoopClosure
 from paraflex.validity import large_rotations, shared_loads
 from .assemblies import FoundAssembly, assemblies_of
-from .exact import Drive, ExactMotion, Held, Start, placed
+from .exact import Drive, ExactMotion, FirstPose, Held, placed
 from .features import KinematicFeatures, features_of
 from .loads import with_limits, with_loads
 from .ranges import Wish, check_determined, chosen_drive, driven_loops, followed, freedoms_at, ranged
@@ -102,7 +102,7 @@ class DrivenMotion(MotionRun):
         if times.size != solution.t.size or times[-1] != solution.t[-1]:
             if rigid is None:
                 (t, q, v, a), passed = followed(
-                    self.loops, times, Start(solution.q[0], (solution.v[0], solution.a[0])), drive
+                    self.loops, times, FirstPose(solution.q[0], (solution.v[0], solution.a[0])), drive
                 )
             else:
                 assert isinstance(self.loops, PathClosure)
@@ -208,7 +208,7 @@ def kinematics(
             raise InputError("is missing", field="duration", remedy="give it in seconds, or name a drive")
         check_times(duration, None)
         loops, pose = driven_loops(moved, near, duration, freedoms)
-        arrays, passed = followed(loops, np.linspace(0.0, duration, samples), Start(pose))
+        arrays, passed = followed(loops, np.linspace(0.0, duration, samples), FirstPose(pose))
         return _motion(moved, arrays, began, None, loops, passed=passed)
     notes = list[Finding]()
     loops, first, law, moved_to = _ranged(moved, law, wish, freedoms, system, (near, closed))
@@ -227,7 +227,7 @@ def kinematics(
 
 def _ranged(
     mechanism: Mechanism, law: Drive, wish: Wish, freedoms: int, system: System, poses: tuple[Array, Array]
-) -> tuple[LoopClosure, Start, Drive, str]:
+) -> tuple[LoopClosure, FirstPose, Drive, str]:
     """Return closure, start and drive from an assembly as given or, if that fails, closed; then also its value."""
     near, closed = poses
     fixed = wish.end is not None or wish.duration is not None

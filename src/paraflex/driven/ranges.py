@@ -17,7 +17,7 @@ from paraflex.formatting import quantity
 from paraflex.mechanism import Assembly, ConstantSpeed, Mechanism, PrescribedAngle
 from paraflex.mechanism.quantities import finite, known
 from paraflex.paths.loops import LoopClosure, no_long_steps
-from .exact import AT, NO_TASKS, Drive, Held, Start, follow_past, no_target, width_beside
+from .exact import AT, NO_TASKS, Drive, FirstPose, Held, follow_past, no_target, width_beside
 from .limits import limit_of_reach
 
 # Fraction of the range between two limits of reach that is left out at either limit, where rates grow without bound.
@@ -208,7 +208,7 @@ def _with_drive(mechanism: Mechanism, law: Drive, freedoms: int) -> Mechanism:
 
 def ranged(
     mechanism: Mechanism, law: Drive, pose: Array, freedoms: int, system: System, *, fixed: bool
-) -> tuple[LoopClosure, Start, Drive]:
+) -> tuple[LoopClosure, FirstPose, Drive]:
     """Return closure, start and drive; without a given end the range is a turn or lies between two limits."""
     loops, first = _started(mechanism, law, pose, freedoms, system)
     if fixed or not law.alone or (stopped := _reached(loops, law, first)) is None:
@@ -232,32 +232,34 @@ def ranged(
         back = replace(law, end=span[0])
         first = _end(_closure(mechanism, back, freedoms), back, first)
     law = replace(law, start=span[0], end=span[1], reach=reach)
-    return _closure(mechanism, law, freedoms), Start(first.q), law
+    return _closure(mechanism, law, freedoms), FirstPose(first.q), law
 
 
-def _started(mechanism: Mechanism, law: Drive, pose: Array, freedoms: int, system: System) -> tuple[LoopClosure, Start]:
+def _started(
+    mechanism: Mechanism, law: Drive, pose: Array, freedoms: int, system: System
+) -> tuple[LoopClosure, FirstPose]:
     """Return closure and start; a start at a change point or beyond one is reached along the motion from a pose."""
     at_first = {joint: first for joint, (first, _) in law.ends_of_others.items()}
     way = replace(law, start=joint_value(system, law.joint, pose), end=law.start, held=at_first)
     try:
         loops, near = driven_loops(_with_drive(mechanism, law, freedoms), pose, law.duration, freedoms)
         if way.start == way.end or not _folded(loops, near):
-            return loops, Start(near)
+            return loops, FirstPose(near)
     except AssemblyError:
         if way.start == way.end:
             raise
     there, pose = driven_loops(_with_drive(mechanism, way, freedoms), pose, way.duration, freedoms)
-    end = _end(there, way, Start(pose))
+    end = _end(there, way, FirstPose(pose))
     if end.rates is None or not law.alone:
-        return _closure(mechanism, law, freedoms), Start(end.q)
+        return _closure(mechanism, law, freedoms), FirstPose(end.q)
     sign = math.copysign(1.0, (way.end - way.start) * (law.end - law.start))
-    return _closure(mechanism, law, freedoms), Start(end.q, (sign * end.rates[0], end.rates[1]))
+    return _closure(mechanism, law, freedoms), FirstPose(end.q, (sign * end.rates[0], end.rates[1]))
 
 
-def _end(loops: LoopClosure, law: Drive, first: Start) -> Start:
+def _end(loops: LoopClosure, law: Drive, first: FirstPose) -> FirstPose:
     """Return the last pose of a motion, with velocities and accelerations."""
     _, q, v, a = followed(loops, np.array([0.0, law.duration]), first, law)[0]
-    return Start(q[-1], (v[-1], a[-1]))
+    return FirstPose(q[-1], (v[-1], a[-1]))
 
 
 def _folded(loops: LoopClosure, q: Array) -> bool:
@@ -270,7 +272,7 @@ def _closure(mechanism: Mechanism, law: Drive, freedoms: int) -> LoopClosure:
     return LoopClosure(_with_drive(mechanism, law, freedoms), max(law.duration, 1e-6), None, NO_TASKS)
 
 
-def _reached(loops: LoopClosure, law: Drive, first: Start) -> Array | None:
+def _reached(loops: LoopClosure, law: Drive, first: FirstPose) -> Array | None:
     """Return the last pose with closed loops before the end of a drive's travel; None if it covers all of it."""
     times = np.linspace(0.0, law.duration, 181)
     keep = np.ones(times.size, dtype=bool)
@@ -279,7 +281,7 @@ def _reached(loops: LoopClosure, law: Drive, first: Start) -> Array | None:
 
 
 def followed(
-    loops: LoopClosure, times: Array, first: Start, law: Drive | None = None
+    loops: LoopClosure, times: Array, first: FirstPose, law: Drive | None = None
 ) -> tuple[tuple[Array, ...], tuple[float, ...]]:
     """Return times, coordinates, velocities and accelerations along the whole motion, and times of change points."""
     grid, keep = times, np.ones(times.size, dtype=bool)
