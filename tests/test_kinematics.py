@@ -467,6 +467,8 @@ def test_a_parallelogram_turns_through_its_folded_poses_without_turning_its_coup
         rocker, crank = (data[name].sel(body=body) for body in ("rocker", "crank"))
         assert float(abs(rocker - crank).max()) < least, name
     assert [one.code for one in motion.findings] == ["special-pose"]
+    upward = pf.kinematics(PARALLELOGRAM, "O", start=-0.1, end=0.1, samples=samples)
+    assert upward.findings[0].text == "assemblies meet, a change point, with O at 0 rad"
     assert "3.14159 rad" in motion.findings[0].text or start > 3.0
     assert motion.features.trails["coupler.P"].crunodes == ()
 
@@ -483,9 +485,10 @@ def test_a_crossed_parallelogram_stays_crossed():
     assert (crank / rocker)[usual] == pytest.approx(-(0.4 - 0.1) / (0.4 + 0.1), abs=1e-9)
 
 
-def test_a_motion_that_starts_at_a_change_point_is_refused():
+def test_a_motion_from_an_assembly_at_a_change_point_is_refused():
+    folded = pf.Assembly("folded", {"crank": math.pi, "coupler": 0.0, "rocker": math.pi})
     with pytest.raises(UnreachablePathError, match=r"change point or a limit of reach near O at 3\.14159 rad"):
-        pf.kinematics(PARALLELOGRAM, "O", start=math.pi)
+        pf.kinematics(replace(PARALLELOGRAM, assemblies=(folded,)), "O")
 
 
 def angles_of(motion):
@@ -493,20 +496,22 @@ def angles_of(motion):
     return [data["angle"].sel(body=body).values for body in ("crank", "coupler", "rocker")]
 
 
-@pytest.mark.parametrize("beside", [-0.4, -0.01, -0.001, 0.1, 0.6])
-def test_a_motion_starts_beside_a_change_point_or_beyond_one(beside):
+@pytest.mark.parametrize("beside", [-0.4, -0.01, -1e-5, 0.0, 1e-4, 0.1, 0.6])
+def test_a_motion_starts_at_a_change_point_or_beside_it(beside):
     start = math.pi + math.radians(beside)
     motion = pf.kinematics(PARALLELOGRAM, "O", start=start, end=math.pi + 0.3, samples=31)
     crank, coupler, rocker = angles_of(motion)
     assert np.max(np.abs(coupler)) < 1e-10
     assert np.max(np.abs(rocker - crank)) < 1e-10
-    assert [motion.drive.at(t) for t in motion.passed] == pytest.approx([math.pi] if beside < 0.0 else [], abs=1e-6)
+    assert [motion.drive.at(t) for t in motion.passed] == pytest.approx([math.pi] if beside <= 1e-4 else [], abs=1e-6)
+    data = pf.motion_dataset(motion)
+    assert float(abs(data["angular_acceleration"].sel(body="coupler")).max()) < 1e-8
     # Backwards, the motion ends where it started.
     back = pf.kinematics(PARALLELOGRAM, "O", start=math.pi + 0.3, end=start, samples=31)
     assert np.max(np.abs(angles_of(back)[2][::-1] - rocker)) < 1e-10
 
 
-@pytest.mark.parametrize("beside", [-0.1, 0.2])
+@pytest.mark.parametrize("beside", [-0.1, -1e-3, 0.0, 0.2])
 def test_a_crossed_parallelogram_starts_crossed_beside_a_change_point(beside):
     start = math.pi + math.radians(beside)
     crank, _, rocker = angles_of(
@@ -579,7 +584,7 @@ def test_forces_at_a_change_point_are_the_limit_of_those_beside_it(half):
     motion = pf.torques(HEAVY, "O", **span)
     at = pf.motion_dataset(motion).isel(time=10)
     assert motion.drive.at(motion.solution.t[10]) == pytest.approx(math.pi, abs=1e-12)
-    within = 1e-7 if half > 0.02 else 3e-5
+    within = 1e-6 if half > 0.02 else 1e-4
     assert at["joint_force"].sel(joint="B").values == pytest.approx([-5.0, 0.0], abs=within)
     assert float(at["drive_torque"].sel(drive="O")) == pytest.approx(0.0, abs=1e-7)
     assert [one.code for one in motion.findings] == ["special-pose"]

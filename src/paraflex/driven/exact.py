@@ -1,7 +1,7 @@
 """Motion of a driven mechanism at any time, from the closure of its loops."""
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property, partial
 from typing import Any, NamedTuple
@@ -13,6 +13,8 @@ from paraflex.arrays import Array, Brief, Mask
 from paraflex.dynamics import System, build_system
 from paraflex.dynamics.soundness import Mobility, mobility
 from paraflex.dynamics.state import State
+from paraflex.errors import listed
+from paraflex.formatting import quantity
 from paraflex.integrators import Solution
 from paraflex.kernel.closure import LOOPS_CLOSED
 from paraflex.mechanism import ConstantSpeed
@@ -28,8 +30,10 @@ AT = 1e-3
 _SAME_BRANCH = 0.05
 # Singular value of constraints that depend on others, relative to the largest, and accuracy of a change point.
 _DEPENDENT = 1e-9
-# Change points that a motion may pass.
-_MOST_PASSED = 100
+# Part of the width about a change point to which its place is shown.
+_SHARP = 1e-6
+# Change points that a motion may pass, and those that a finding lists.
+_MOST_PASSED, _SHOWN = 100, 6
 Target = Callable[[Array], Array]
 # Values at which other joints are held, or between which they move [rad, m].
 Held = Mapping[str, float | tuple[float, float]]
@@ -44,6 +48,23 @@ def no_target(times: Array) -> Array:
 def width_beside(drive: "Drive | None", end: float) -> float:
     """Return the time before and after a change point over which a motion until `end` is interpolated [s]."""
     return _BESIDE * (2.0 * math.pi / drive.speed if drive is not None and drive.unit == "rad" else end)
+
+
+def placed(drive: "Drive | None", times: Sequence[float]) -> tuple[str, str]:
+    """Return the place of a finding on some times of a motion [s], and the values of the drive at these times."""
+    if drive is None:
+        return "drive", f"drives at t = {listed([f'{t:.6g}' for t in times], _SHOWN)} s"
+    # Errors of the times would be shown of a value of zero.
+    least = _SHARP * drive.speed * width_beside(drive, drive.duration)
+    values = [quantity(least * round(drive.at(t) / least), drive.unit, digits=6) for t in times]
+    return f"drive {drive.joint}", f"{drive.joint} at {listed(values, _SHOWN)}"
+
+
+class FirstPose(NamedTuple):
+    """First pose (n,) of a motion, and its velocities and accelerations if known, which tell assemblies apart."""
+
+    q: Array
+    rates: tuple[Array, Array] | None = None
 
 
 class ExactState(NamedTuple):
@@ -122,7 +143,7 @@ class Drive:
 
 
 def follow_past(
-    loops: LoopClosure, target: Target, grid: Array, keep: Mask, pose: Array, beside: float
+    loops: LoopClosure, target: Target, grid: Array, keep: Mask, first: FirstPose, beside: float
 ) -> tuple[ClosedLoops, list[float]]:
     """Follow a motion as `LoopClosure.follow` does, and past change points, on the branch whose velocities continue.
 
@@ -136,6 +157,13 @@ def follow_past(
     """
     passed: list[float] = []
     parts: list[tuple[Array, ...]] = []
+    pose, begin = first.q, float(grid[0])
+    if first.rates is not None and not loops.coordinates.size:
+        # From a time before the start, where the branch is that of the velocities.
+        step, (v, a) = -2.0 * beside, first.rates
+        lead = _closed_near(loops, begin + step, pose + step * (v + 0.5 * step * a))
+        if lead is not None:
+            grid, keep, pose = np.append(begin + step, grid), np.append(False, keep), lead.q[0]
     while True:
         found = loops.follow(target, grid, keep, pose.copy())
         singular, t = found.stopped, found.arrays[0]
@@ -158,7 +186,7 @@ def follow_past(
         grid, keep = np.append(ends[1], grid[later]), np.append(False, keep[later])
         pose = after.q[0]
     arrays = tuple(np.concatenate(each) for each in zip(*parts, found.arrays, strict=True))
-    return replace(found, arrays=arrays), passed
+    return replace(found, arrays=arrays), [t for t in passed if t >= begin - AT * beside]
 
 
 def _most_singular(system: System, curve: Callable[[float], Array], ends: tuple[float, float]) -> float:
@@ -186,11 +214,18 @@ def _continued(loops: LoopClosure, before: ExactState, ends: tuple[float, float]
     """Return the state beyond a change point on the same branch; None if there is none, as at a limit of reach."""
     step, units = ends[1] - ends[0], loops.system.units
     predicted = before.q + step * (before.v + 0.5 * step * before.a)
-    status, _, (q, v, a, _) = loops.run(np.array(ends[1:]), no_target(np.zeros(1)), predicted[0])
+    after = _closed_near(loops, ends[1], predicted[0])
+    if after is None:
+        return None
+    q, v, _ = after
     off, move = np.max(np.abs((q - predicted) / units)), np.max(np.abs((q - before.q) / units))
     turned, rate = np.max(np.abs((v - before.v - step * before.a) / units)), np.max(np.abs(before.v / units))
-    same = status == LOOPS_CLOSED and off <= _SAME_BRANCH * move and turned <= _SAME_BRANCH * rate
-    return ExactState(q, v, a) if same else None
+    return after if off <= _SAME_BRANCH * move and turned <= _SAME_BRANCH * rate else None
+
+
+def _closed_near(loops: LoopClosure, t: float, pose: Array) -> ExactState | None:
+    status, _, found = loops.run(np.array([t]), no_target(np.zeros(1)), pose)
+    return ExactState(*found[:3]) if status == LOOPS_CLOSED else None
 
 
 @dataclass(frozen=True)
@@ -245,4 +280,6 @@ class ExactMotion(Brief):
         # Where loops close in spite of a change point nearby, accelerations are rounding: the motion goes on beyond it.
         beyond = [one + 2.0 * beside for one in self.passed if abs(one - t) <= beside]
         given = np.array([times[k], t, *beyond]), np.array([False, True, *(False for _ in beyond)])
-        return ExactState(*follow_past(self.loops, self.target, *given, self.solution.q[k], beside)[0].arrays[1:4])
+        solution = self.solution
+        first = FirstPose(solution.q[k], None if k else (solution.v[0], solution.a[0]))
+        return ExactState(*follow_past(self.loops, self.target, *given, first, beside)[0].arrays[1:4])

@@ -13,11 +13,10 @@ from paraflex.dynamics import System, dependence, joint_coordinate, still_signal
 from paraflex.dynamics.rank import NO_PART, joint_of_row
 from paraflex.dynamics.stiffness import RestingForces
 from paraflex.findings import Finding
-from paraflex.formatting import quantity
 from paraflex.integrators import Solution
 from paraflex.kernel.bodies import stored_energy
 from paraflex.kernel.packed import make_scratch
-from .exact import AT, ExactMotion, width_beside
+from .exact import AT, ExactMotion, placed, width_beside
 
 # Singular values below this part of the largest leave forces undetermined.
 _SINGULAR = 1e-9
@@ -108,12 +107,7 @@ def _unbounded(system: System, balance: _Balance) -> Mask:
 
 
 def _growing(motion: ExactMotion, names: tuple[str, ...], times: list[float]) -> Finding:
-    drive = motion.drive
-    if drive is None:
-        place, where = "drive", f"t = {', '.join(f'{t:.6g}' for t in times)} s"
-    else:
-        place, where = f"drive {drive.joint}", ", ".join(quantity(drive.at(t), drive.unit, digits=6) for t in times)
-        where = f"{drive.joint} at {where}"
+    place, where = placed(motion.drive, times)
     return Finding(
         "loads-unbounded", place,
         f"forces in {', '.join(names)} grow without bound towards {where}, where assemblies meet",

@@ -17,7 +17,6 @@ from paraflex.dynamics.joint_coordinates import joint_value, value_text
 from paraflex.dynamics.load_values import check_laws
 from paraflex.errors import AssemblyError, InputError, UnreachablePathError
 from paraflex.findings import Finding
-from paraflex.formatting import quantity
 from paraflex.integrators import Solution, check_times
 from paraflex.kernel.constraints import constraint_values
 from paraflex.kernel.packed import make_scratch
@@ -30,7 +29,7 @@ from paraflex.paths.closure import PathClosure
 from paraflex.paths.loops import LoopClosure
 from paraflex.validity import large_rotations, shared_loads
 from .assemblies import FoundAssembly, assemblies_of
-from .exact import Drive, ExactMotion, Held
+from .exact import Drive, ExactMotion, FirstPose, Held, placed
 from .features import KinematicFeatures, features_of
 from .loads import with_limits, with_loads
 from .ranges import Wish, check_determined, chosen_drive, driven_loops, followed, freedoms_at, ranged
@@ -102,7 +101,9 @@ class DrivenMotion(MotionRun):
         passed, rigid = self.passed, self.rigid
         if times.size != solution.t.size or times[-1] != solution.t[-1]:
             if rigid is None:
-                (t, q, v, a), passed = followed(self.loops, times, solution.q[0], drive)
+                (t, q, v, a), passed = followed(
+                    self.loops, times, FirstPose(solution.q[0], (solution.v[0], solution.a[0])), drive
+                )
             else:
                 assert isinstance(self.loops, PathClosure)
                 rigid = PathFollower(self.loops, solution.q[0], rigid.path)(times)
@@ -207,10 +208,10 @@ def kinematics(
             raise InputError("is missing", field="duration", remedy="give it in seconds, or name a drive")
         check_times(duration, None)
         loops, pose = driven_loops(moved, near, duration, freedoms)
-        arrays, passed = followed(loops, np.linspace(0.0, duration, samples), pose)
+        arrays, passed = followed(loops, np.linspace(0.0, duration, samples), FirstPose(pose))
         return _motion(moved, arrays, began, None, loops, passed=passed)
     notes = list[Finding]()
-    loops, pose, law, moved_to = _ranged(moved, law, wish, freedoms, system, (near, closed))
+    loops, first, law, moved_to = _ranged(moved, law, wish, freedoms, system, (near, closed))
     if moved_to:
         text = (
             f"the loops do not close with {law.joint} at {value_text(system, law.joint, near)} as given, but {moved_to}"
@@ -219,15 +220,15 @@ def kinematics(
         notes.append(Finding("assembly-moved", f"assembly.{chosen.name}", text, remedy))
     if start is None and not law.held:
         kept = law.start == joint_value(system, law.joint, near)
-        notes += large_rotations(system, chosen, pose if kept else closed)
-    arrays, passed = followed(loops, np.linspace(0.0, law.duration, samples), pose, law)
+        notes += large_rotations(system, chosen, first.q if kept else closed)
+    arrays, passed = followed(loops, np.linspace(0.0, law.duration, samples), first, law)
     return _motion(loops.mechanism, arrays, began, law, loops, passed=passed, notes=notes)
 
 
 def _ranged(
     mechanism: Mechanism, law: Drive, wish: Wish, freedoms: int, system: System, poses: tuple[Array, Array]
-) -> tuple[LoopClosure, Array, Drive, str]:
-    """Return closure, first pose and drive from an assembly as given or, if that fails, closed; then also its value."""
+) -> tuple[LoopClosure, FirstPose, Drive, str]:
+    """Return closure, start and drive from an assembly as given or, if that fails, closed; then also its value."""
     near, closed = poses
     fixed = wish.end is not None or wish.duration is not None
     try:
@@ -275,11 +276,10 @@ def _motion(
     system, still = build_system(mechanism), {motor.name: 0.0 for motor in mechanism.motors}
     effort = np.full((arrays[0].size, len(still)), np.nan)
     if passed:
-        where = "drives are" if law is None else f"{law.joint} is"
-        places = (f"t = {t:.6g} s" if law is None else quantity(law.at(t), law.unit, digits=6) for t in passed)
-        text = f"assemblies meet, a change point, where {where} at {', '.join(places)}"
+        place, where = placed(law, passed)
+        text = f"assemblies meet, a change point, with {where}"
         remedy = "the motion continues in the assembly whose velocities are continuous"
-        notes = [*notes, Finding("special-pose", "drive" if law is None else f"drive {law.joint}", text, remedy)]
+        notes = [*notes, Finding("special-pose", place, text, remedy)]
     solution = _solution(system, arrays, began)
     return DrivenMotion(
         system, arrays[0], still, solution, law, loops, effort, passed=passed, notes=tuple(notes), **more

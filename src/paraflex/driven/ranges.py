@@ -17,7 +17,7 @@ from paraflex.formatting import quantity
 from paraflex.mechanism import Assembly, ConstantSpeed, Mechanism, PrescribedAngle
 from paraflex.mechanism.quantities import finite, known
 from paraflex.paths.loops import LoopClosure, no_long_steps
-from .exact import AT, NO_TASKS, Drive, Held, follow_past, no_target, width_beside
+from .exact import AT, NO_TASKS, Drive, FirstPose, Held, follow_past, no_target, width_beside
 from .limits import limit_of_reach
 
 # Fraction of the range between two limits of reach that is left out at either limit, where rates grow without bound.
@@ -208,28 +208,19 @@ def _with_drive(mechanism: Mechanism, law: Drive, freedoms: int) -> Mechanism:
 
 def ranged(
     mechanism: Mechanism, law: Drive, pose: Array, freedoms: int, system: System, *, fixed: bool
-) -> tuple[LoopClosure, Array, Drive]:
-    """Return closure, first pose and drive; without a given end the range is a turn or lies between two limits."""
-    at_first = {joint: first for joint, (first, _) in law.ends_of_others.items()}
-    way = replace(law, start=joint_value(system, law.joint, pose), end=law.start, held=at_first)
-    try:
-        loops, pose = driven_loops(_with_drive(mechanism, law, freedoms), pose, law.duration, freedoms)
-    except AssemblyError:
-        if way.start == way.end:
-            raise
-        # A start beyond a change point is reached along the motion from the assembly.
-        there, pose = driven_loops(_with_drive(mechanism, way, freedoms), pose, way.duration, freedoms)
-        loops, pose = _closure(mechanism, law, freedoms), _last_pose(there, way, pose)
-    if fixed or not law.alone or (stopped := _reached(loops, law, pose)) is None:
+) -> tuple[LoopClosure, FirstPose, Drive]:
+    """Return closure, start and drive; without a given end the range is a turn or lies between two limits."""
+    loops, first = _started(mechanism, law, pose, freedoms, system)
+    if fixed or not law.alone or (stopped := _reached(loops, law, first)) is None:
         if not fixed and law.unit == "m":
             raise InputError(
                 "a joint that slides without a limit of reach", field="drive", value=law.joint, remedy=_GIVE_RANGE
             )
-        return loops, pose, law
+        return loops, first, law
     ends = []
     for way in (law, replace(law, end=2.0 * law.start - law.end)):
         there = _closure(mechanism, way, freedoms)
-        stopped = _reached(there, way, pose)
+        stopped = _reached(there, way, first)
         limit = None if stopped is None else limit_of_reach(there.system, law.joint, stopped)
         if limit is None:
             raise _barred(way, there, stopped, None)
@@ -239,43 +230,71 @@ def ranged(
     span = (low + inside, high - inside) if law.end > law.start else (high - inside, low + inside)
     if span[0] != law.start:
         back = replace(law, end=span[0])
-        pose = _last_pose(_closure(mechanism, back, freedoms), back, pose)
+        first = _end(_closure(mechanism, back, freedoms), back, first)
     law = replace(law, start=span[0], end=span[1], reach=reach)
-    return _closure(mechanism, law, freedoms), pose, law
+    return _closure(mechanism, law, freedoms), FirstPose(first.q), law
 
 
-def _last_pose(loops: LoopClosure, law: Drive, pose: Array) -> Array:
-    return followed(loops, np.array([0.0, law.duration]), pose, law)[0][1][-1]
+def _started(
+    mechanism: Mechanism, law: Drive, pose: Array, freedoms: int, system: System
+) -> tuple[LoopClosure, FirstPose]:
+    """Return closure and start; a start at a change point or beyond one is reached along the motion from a pose."""
+    at_first = {joint: first for joint, (first, _) in law.ends_of_others.items()}
+    way = replace(law, start=joint_value(system, law.joint, pose), end=law.start, held=at_first)
+    try:
+        loops, near = driven_loops(_with_drive(mechanism, law, freedoms), pose, law.duration, freedoms)
+        if way.start == way.end or not _folded(loops, near):
+            return loops, FirstPose(near)
+    except AssemblyError:
+        if way.start == way.end:
+            raise
+    there, pose = driven_loops(_with_drive(mechanism, way, freedoms), pose, way.duration, freedoms)
+    end = _end(there, way, FirstPose(pose))
+    if end.rates is None or not law.alone:
+        return _closure(mechanism, law, freedoms), FirstPose(end.q)
+    sign = math.copysign(1.0, (way.end - way.start) * (law.end - law.start))
+    return _closure(mechanism, law, freedoms), FirstPose(end.q, (sign * end.rates[0], end.rates[1]))
+
+
+def _end(loops: LoopClosure, law: Drive, first: FirstPose) -> FirstPose:
+    """Return the last pose of a motion, with velocities and accelerations."""
+    _, q, v, a = followed(loops, np.array([0.0, law.duration]), first, law)[0]
+    return FirstPose(q[-1], (v[-1], a[-1]))
+
+
+def _folded(loops: LoopClosure, q: Array) -> bool:
+    """Return whether a pose is near a change point or a limit of reach."""
+    sizes = np.linalg.svd(loops.system.dimensionless_jacobian(q), compute_uv=False)
+    return bool(sizes[-1] < _NEAR * sizes[0])
 
 
 def _closure(mechanism: Mechanism, law: Drive, freedoms: int) -> LoopClosure:
     return LoopClosure(_with_drive(mechanism, law, freedoms), max(law.duration, 1e-6), None, NO_TASKS)
 
 
-def _reached(loops: LoopClosure, law: Drive, pose: Array) -> Array | None:
+def _reached(loops: LoopClosure, law: Drive, first: FirstPose) -> Array | None:
     """Return the last pose with closed loops before the end of a drive's travel; None if it covers all of it."""
     times = np.linspace(0.0, law.duration, 181)
     keep = np.ones(times.size, dtype=bool)
-    found, _ = follow_past(loops, no_target, times, keep, pose, width_beside(law, law.duration))
+    found, _ = follow_past(loops, no_target, times, keep, first, width_beside(law, law.duration))
     return None if found.closed else found.last
 
 
 def followed(
-    loops: LoopClosure, times: Array, pose: Array, law: Drive | None = None
+    loops: LoopClosure, times: Array, first: FirstPose, law: Drive | None = None
 ) -> tuple[tuple[Array, ...], tuple[float, ...]]:
     """Return times, coordinates, velocities and accelerations along the whole motion, and times of change points."""
     grid, keep = times, np.ones(times.size, dtype=bool)
     if law is not None:
         grid, keep = no_long_steps(times, _STEP * law.duration / max(law.turns, 1.0))
     beside = width_beside(law, float(times[-1]))
-    found, passed = follow_past(loops, no_target, grid, keep, pose, beside)
+    found, passed = follow_past(loops, no_target, grid, keep, first, beside)
     if not found.closed:
         raise _barred(law, loops, found.last, found.stopped)
-    sizes = np.linalg.svd(loops.system.dimensionless_jacobian(found.last), compute_uv=False)
-    if law is not None and sizes[-1] < _NEAR * sizes[0]:
+    if law is not None and _folded(loops, found.last):
         # Accelerations at the end are rounding errors, unless the motion beyond a change point tells them.
         beyond = np.append(grid, grid[-1] + 2.0 * beside), np.append(keep, False)
-        more, later = follow_past(loops, no_target, *beyond, pose, beside)
+        more, later = follow_past(loops, no_target, *beyond, first, beside)
         if more.closed:
             found, passed = more, [t for t in later if t <= times[-1] + AT * beside]
     return found.arrays[:4], tuple(passed)
