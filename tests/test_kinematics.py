@@ -782,6 +782,16 @@ def test_the_commands_write_results_that_other_commands_take(rocker, tmp_path):
     assert "flywheel for a fluctuation of 0.02: 0.0754 kg m^2" in done.stdout
 
 
+def test_loads_have_bounds_of_their_errors():
+    """A share of the largest load, in which moments count by the size of the mechanism; those of a run have them too."""
+    motion = pf.torques(pf.load("four_bar"), "O", speed=10.0)
+    data = pf.motion_dataset(motion)
+    force, torque = (data[f"{name}_error"].values for name in ("joint_force", "drive_torque"))
+    largest = np.max(np.linalg.norm(data["joint_force"].values, axis=-1))
+    assert np.all((0.3e-9 * largest < force) & (force < 3e-9 * largest))
+    assert np.all((0.03e-9 * largest < torque) & (torque < 0.3e-9 * largest))
+
+
 def test_paths_of_points_mark_cusps_and_crunodes(rocker):
     motion = pf.kinematics(pf.load(rocker), "O")
     chart = next(iter(point_paths(as_runs(pf.motion_dataset(motion)))))

@@ -18,6 +18,8 @@ from paraflex.kernel.bodies import stored_energy
 from paraflex.kernel.packed import make_scratch
 from .exact import AT, ExactMotion, placed, width_beside
 
+# Share of the largest load within which loads agree with other programs, in the tests.
+_RIGHT_TO = 1e-9
 # Singular values below this part of the largest leave forces undetermined.
 _SINGULAR = 1e-9
 # The same at a change point, whose place has an error, and work of the required forces on the free motion there below
@@ -64,6 +66,12 @@ def with_loads(system: System, solution: Solution, effort: Array) -> Solution:
         energies[k] = stored_energy(system.packed, q, solution.v[k], lam, scratch)[:2]
     multipliers[ranks < np.max(ranks)] = np.nan
     return replace(solution, multipliers=multipliers, kinetic_energy=energies[:, 0], strain_energy=energies[:, 1])
+
+
+def load_errors(system: System, multipliers: Array) -> Array:
+    """Return bounds (m,) of the errors of multipliers (k, m), a share of the largest, in which moments count by size."""
+    largest = np.nanmax(np.abs(multipliers * system.row_units), initial=0.0)
+    return _RIGHT_TO * largest / system.row_units
 
 
 def with_limits(motion: ExactMotion, solution: Solution) -> tuple[Solution, list[Finding]]:
