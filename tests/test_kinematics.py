@@ -783,7 +783,7 @@ def test_the_commands_write_results_that_other_commands_take(rocker, tmp_path):
 
 
 def test_loads_have_bounds_of_their_errors():
-    """A share of the largest load, in which moments count by the size of the mechanism; those of a run have them too."""
+    """A share of the largest load, in which moments count by the size of the mechanism."""
     motion = pf.torques(pf.load("four_bar"), "O", speed=10.0)
     data = pf.motion_dataset(motion)
     force, torque = (data[f"{name}_error"].values for name in ("joint_force", "drive_torque"))

@@ -69,7 +69,7 @@ def with_loads(system: System, solution: Solution, effort: Array) -> Solution:
 
 
 def load_errors(system: System, multipliers: Array) -> Array:
-    """Return bounds (m,) of the errors of multipliers (k, m), a share of the largest, in which moments count by size."""
+    """Return bounds (m,) of the errors of multipliers (k, m): a share of the largest, moments over the size."""
     largest = np.nanmax(np.abs(multipliers * system.row_units), initial=0.0)
     return _RIGHT_TO * largest / system.row_units
 
