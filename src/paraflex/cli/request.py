@@ -1,7 +1,6 @@
 """Common parts of commands that simulate a study: model, paths, modes, controllers, plan, and errors."""
 
 import math
-import sys
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict
@@ -34,8 +33,6 @@ def requested_model(choice: ModelChoice) -> Model:
         if not (name.strip() and equals):
             raise InputError("not FIELD=VALUE", field="--set", value=text, remedy='write "link1.length=0.3"')
         found[name.strip()] = value_of(value.strip())
-    if choice.given is None:
-        print(f"no model is named: this is {choice.name}", file=sys.stderr)
     model = load(choice.name, set=found)
     prefer_units(model.parameters.get("units", {}))
     return model

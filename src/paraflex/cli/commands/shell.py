@@ -13,6 +13,7 @@ import typer
 from paraflex.cli.signals import exit_code, is_taken, raised
 from paraflex.errors import InputError
 from . import models, results, runs, studies
+from .options import ModelChoice
 
 
 class ListedCommand(NamedTuple):
@@ -31,7 +32,7 @@ class ListedCommand(NamedTuple):
         module, _, function = self.function.partition(".")
         do = getattr(import_module(f"paraflex.cli.{module}"), function)
         try:
-            with raised(), _outside(request), _in_file(request):
+            with raised(), _outside(request), _of_model(request):
                 return do(request)
         except BaseException as error:
             # An interrupted library may raise an error of its own instead.
@@ -57,10 +58,12 @@ def _outside(request: Any) -> AbstractContextManager[None]:
 
 
 @contextmanager
-def _in_file(request: Any) -> Iterator[None]:
-    """Add the file of the requested model to errors of its mechanism, which does not know it."""
+def _of_model(request: Any) -> Iterator[None]:
+    """Add the file of the requested model to errors of its mechanism, which does not know it; tell of a default."""
     try:
         yield
+        if type(model := getattr(request, "model", None)) is ModelChoice and model.given is None:
+            typer.echo(f"no model is named: this is {model.name}", err=True)
     except InputError as error:
         named = None if error.source else getattr(getattr(request, "model", None), "given", None)
         raise (error.in_file(named) if named and error.field.startswith(_TABLES) else error) from error.__cause__
