@@ -18,8 +18,8 @@ from paraflex.kernel.bodies import stored_energy
 from paraflex.kernel.packed import make_scratch
 from .exact import AT, ExactMotion, placed, width_beside
 
-# Share of the largest load within which loads agree with other programs, in the tests.
-_RIGHT_TO = 1e-9
+# Share of the largest load within which loads agree with other programs in the tests, and limits with closed forms.
+RIGHT_TO, LIMITS_RIGHT_TO = 1e-9, 1e-6
 # Singular values below this part of the largest leave forces undetermined.
 _SINGULAR = 1e-9
 # The same at a change point, whose place has an error, and work of the required forces on the free motion there below
@@ -68,10 +68,9 @@ def with_loads(system: System, solution: Solution, effort: Array) -> Solution:
     return replace(solution, multipliers=multipliers, kinetic_energy=energies[:, 0], strain_energy=energies[:, 1])
 
 
-def load_errors(system: System, multipliers: Array) -> Array:
+def load_errors(system: System, multipliers: Array, share: float) -> Array:
     """Return bounds (m,) of the errors of multipliers (k, m): a share of the largest, moments over the size."""
-    largest = np.nanmax(np.abs(multipliers * system.row_units), initial=0.0)
-    return _RIGHT_TO * largest / system.row_units
+    return share * np.nanmax(np.abs(multipliers * system.row_units), initial=0.0) / system.row_units
 
 
 def with_limits(motion: ExactMotion, solution: Solution) -> tuple[Solution, list[Finding]]:

@@ -31,7 +31,7 @@ from paraflex.validity import large_rotations, shared_loads
 from .assemblies import FoundAssembly, assemblies_of
 from .exact import Drive, ExactMotion, FirstPose, Held, placed
 from .features import KinematicFeatures, features_of
-from .loads import load_errors, with_limits, with_loads
+from .loads import LIMITS_RIGHT_TO, RIGHT_TO, load_errors, with_limits, with_loads
 from .ranges import Wish, check_determined, chosen_drive, driven_loops, followed, freedoms_at, ranged
 
 # Samples between which properties are located: of a drive, and at most for other motions.
@@ -350,7 +350,8 @@ def torques(
         exact = ExactMotion(motion.system, motion.solution, motion.drive, motion.loops, passed=motion.passed)
         solution, unbounded = with_limits(exact, solution)
         notes += unbounded
-    solution = replace(solution, multiplier_errors=load_errors(motion.system, solution.multipliers))
+    errors = load_errors(motion.system, solution.multipliers, LIMITS_RIGHT_TO if motion.passed else RIGHT_TO)
+    solution = replace(solution, multiplier_errors=errors)
     return replace(motion, solution=solution, effort=effort, mode=name, notes=tuple(notes))
 
 
