@@ -300,16 +300,10 @@ def labelled(name: str, unit: str) -> str:
 
 def text_symbol(name: str) -> str:
     """Return a name as shown: "τ₁" for "tau1", "A₁" for "A1", others unchanged."""
-    letters, digits = _parted(name)
-    if len(letters) == 1 or letters in GREEK:
-        return GREEK.get(letters, letters) + digits.translate(_LOWERED)
-    return name
-
-
-def _parted(name: str) -> tuple[str, str]:
-    """Split a name into its letters and its number; both are empty if it has another form."""
     parts = re.fullmatch(r"([A-Za-z]+)[ _]?(\d*)", name)
-    return (parts[1], parts[2]) if parts else ("", "")
+    if parts and (len(parts[1]) == 1 or parts[1] in GREEK):
+        return GREEK.get(parts[1], parts[1]) + parts[2].translate(_LOWERED)
+    return name
 
 
 def printable(text: str) -> str:

@@ -30,7 +30,10 @@ def kinematics_command(request: KinematicsRequest) -> int:
     if request.model.given is None:
         return without_model("torques" if isinstance(request, TorquesRequest) else "kinematics")
     model = requested_model(request.model)
-    give_dataset("motion", lambda: _data(model, request), _summary, _print, request.files)
+    give_dataset(
+        "motion", lambda: _data(model, request),
+        lambda data: {**motion_summary(data), "kinematics": kinematics_of(data)}, _print, request.files,
+    )  # fmt: skip
     return COMPLETE
 
 
@@ -113,10 +116,6 @@ def _ends(joint: str, text: str, unit: str) -> float | tuple[float, ...]:
 def _number(text: str, unit: str, field: str) -> float:
     with renamed(field):
         return number_in(text, unit)
-
-
-def _summary(data: xr.Dataset) -> dict[str, Any]:
-    return {**motion_summary(data), "kinematics": kinematics_of(data)}
 
 
 def _print(out: PlainConsole, data: xr.Dataset) -> None:

@@ -133,7 +133,8 @@ def metrics_of(
     if names:
         return tuple(dict.fromkeys([*names, *ALWAYS[runs]]))
     motors = mechanism is None or mechanism.motors
-    kept = [one.name for one in METRICS.values() if one.is_kept_of(runs) and (motors or not one.of_motors)]
+    known = [one for one in METRICS.values() if runs in (one.runs if one.kept_of is None else one.kept_of)]
+    kept = [one.name for one in known if motors or not one.of_motors]
     # The metrics for which such runs are made come first.
     first = {PATH: [HEADLINE[as_enum(ErrorSpan, error, "error")]],
              STATICS: [name for name in kept if METRICS[name].runs == (STATICS,)]}.get(runs, [])  # fmt: skip

@@ -70,7 +70,7 @@ class Closure:
         return self.state is None and self.gap == 0.0
 
 
-def closure_of(system: System, assembly: Assembly, time: float = 0.0) -> Closure:
+def closure_of(system: System, assembly: Assembly) -> Closure:
     """Close an assembly and report the gaps; no error is raised if the assembly cannot be closed.
 
     The rigid mechanism shows whether lengths and positions fit: its links are not stretched to fit.
@@ -84,17 +84,17 @@ def closure_of(system: System, assembly: Assembly, time: float = 0.0) -> Closure
     time : float
         Time of prescribed motions [s].
     """
-    signals, nan = moment_signals(system.mechanism, time), math.nan
+    signals, nan = moment_signals(system.mechanism, 0.0), math.nan
     q = reference_pose(system, assembly)
-    before = max(joint_gaps(system, system.constraints(signals, time, q)[0]).values(), default=0.0)
+    before = max(joint_gaps(system, system.constraints(signals, 0.0, q)[0]).values(), default=0.0)
     try:
-        state = consistent_state(system, assembly, time=time)
+        state = consistent_state(system, assembly)
     except AssemblyError as error:
-        gaps = joint_gaps(system, system.constraints(signals, time, error.partial)[0])
+        gaps = joint_gaps(system, system.constraints(signals, 0.0, error.partial)[0])
         return Closure(assembly.name, before, nan, nan, max(gaps.values()), tuple(gaps), error.cause, None)
     except (InconsistentConstraintsError, ProportionError) as error:
         return Closure(assembly.name, before, nan, nan, 0.0, (), error.cause.rstrip(","), None, error.remedy)
-    phi, rate = system.constraints(signals, time, state.q, state.v)
+    phi, rate = system.constraints(signals, 0.0, state.q, state.v)
     position, velocity = (float(np.max(np.abs(part), initial=0.0)) for part in (phi, rate))
     return Closure(assembly.name, before, position, velocity, 0.0, (), "", state)
 
@@ -152,11 +152,6 @@ class Mobility:
     def freedoms(self) -> int:
         """Degrees of freedom at the pose: three per body less the rank."""
         return 3 * self.bodies - self.rank
-
-    @property
-    def nearby_redundant(self) -> int:
-        """Number of redundant constraints, without those that are redundant at a special pose only."""
-        return len(self.redundant) - (self.freedoms - (self.nearby_freedoms or 0) if self.special else 0)
 
     @property
     def special(self) -> bool:

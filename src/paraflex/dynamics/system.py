@@ -108,11 +108,6 @@ class System(PlacedBodies):
         return rows.tocsr()
 
     @cached_property
-    def least_row_unit(self) -> float:
-        """Least of `row_units`."""
-        return float(np.min(self.row_units, initial=1.0))
-
-    @cached_property
     def slowest(self) -> float:
         """Angular frequency of the slowest vibration of a flexible body [rad/s]; 1000 if there is none."""
         return min((float(np.min(body.modes.omega)) for body in self.bodies if body.nf), default=_USUAL)

@@ -71,7 +71,7 @@ def evaluate(text: str, parameters: Mapping[str, float]) -> float:
         Syntax error, element that is not allowed, unknown parameter, or value that is not finite.
     """
     _refuse_ambiguous(text, parameters)
-    return _finite(_arithmetic(text, lambda name: look_up(name, parameters)))
+    return _finite(arithmetic(tree_of(text), lambda name: look_up(name, parameters)))
 
 
 def evaluate_in_time(text: str, parameters: Mapping[str, float], t: Array) -> Jet:
@@ -177,7 +177,7 @@ def evaluate_parameters(table: Mapping[str, Any]) -> dict[str, float]:
         entry = table[name]
         if isinstance(entry, str):
             _refuse_ambiguous(entry, table)
-            values[name] = _finite(_arithmetic(entry, lambda other: value_of(other, (*open_names, name))))
+            values[name] = _finite(arithmetic(tree_of(entry), lambda other: value_of(other, (*open_names, name))))
         else:
             values[name] = _float(entry)
         return values[name]
@@ -205,7 +205,7 @@ def _in_time(text: str, parameters: Mapping[str, float], t: Array) -> Any:
 
     # NumPy's warnings are suppressed, because values that are not finite are reported later with their time.
     with np.errstate(all="ignore"):
-        return _arithmetic(text, value_of)
+        return arithmetic(tree_of(text), value_of)
 
 
 def check_names(text: str, parameters: Mapping[str, Any]) -> None:
@@ -275,10 +275,6 @@ def _refuse_ambiguous(text: str, parameters: Mapping[str, Any]) -> None:
                 f'"{name}" in "{written}" is a unit and a parameter',
                 f"put what is divided by the parameter in brackets, or give the parameter another name than {name}",
             )
-
-
-def _arithmetic(text: str, value_of: Callable[[str], Any]) -> Any:
-    return arithmetic(tree_of(text), value_of)
 
 
 def arithmetic(tree: ast.AST, value_of: Callable[[str], Any]) -> Any:

@@ -245,7 +245,8 @@ def _slides(data: Mapping[str, Any], place: Place) -> bool | None:
         return None
     table, owner, key = place[:3]
     if table == "statics" and owner in ("loads", "moved"):
-        return _moves_straight(data, str(key))
+        point, _, axis = str(key).rpartition(".")
+        return {"x": True, "y": True, "angle": False}.get(axis) if point else _joint_slides(data, key)
     of_motor = table in ("study", "statics") and owner == "torques"
     joint = value_at(data, ("motor", key) if of_motor else (table, owner, "joint"))
     return _joint_slides(data, _below(joint, "joint") if isinstance(joint, dict) else joint)
@@ -270,12 +271,6 @@ def _joint_slides(data: Mapping[str, Any], name: Any) -> bool | None:
         return None
     kind = JOINT_KINDS.get(str(_below(joint, "type")))
     return kind is not None and kind.slides
-
-
-def _moves_straight(data: Mapping[str, Any], coordinate: str) -> bool | None:
-    """Check whether a coordinate of a joint or point is a length; None for an unknown name."""
-    point, _, axis = coordinate.rpartition(".")
-    return {"x": True, "y": True, "angle": False}.get(axis) if point else _joint_slides(data, coordinate)
 
 
 def is_table(annotation: Any) -> bool:

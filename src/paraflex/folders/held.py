@@ -56,7 +56,9 @@ class Manifest:
     def of(cls, kind: str, files: Mapping[str, str], contents: Mapping[str, str]) -> "Manifest":
         """Build the manifest of files from their digests; further files in `contents` are ignored."""
         contents = {name: contents[name] for name in sorted(files) if name in contents}
-        numbers = [f"{name} {contents.get(name, files[name])}" for name in sorted(files) if not _is_derived(name)]
+        # Other files are derived from the numerical results and can be generated again.
+        own = [name for name in sorted(files) if name != _REPORT and not name.startswith(("figures/", "export/"))]
+        numbers = [f"{name} {contents.get(name, files[name])}" for name in own]
         return cls(kind, _hash("\n".join(numbers).encode()).hexdigest(), dict(sorted(files.items())), contents)
 
 
@@ -190,11 +192,6 @@ def _is_listed(file: Path) -> bool:
             expected = manifest.files.get(file.absolute().relative_to(folder).as_posix())
             return expected is None or expected == digest_of(file)
     return True
-
-
-def _is_derived(name: str) -> bool:
-    """Check whether a file is derived from the numerical results and can be generated again."""
-    return name == _REPORT or name.startswith(("figures/", "export/"))
 
 
 def _without_times(found: Any) -> Any:

@@ -74,7 +74,7 @@ def open_constraint(
         Largest violation in the run so far [m, rad].
     """
     allowed = max(_CONTRADICTION if dependent else _GAPS, tolerance / system.size)
-    if largest <= allowed * system.least_row_unit:
+    if largest <= allowed * np.min(system.row_units, initial=1.0):
         return None
     phi, _ = system.constraints(signals, t, q)
     if not system.gap(phi) > allowed:

@@ -70,15 +70,11 @@ def packed(values: ArrayLike) -> dict[str, Any]:
     # A few frames in the middle show which orders suit.
     middle = array.shape[1] // 2
     few = whole[:, max(0, middle - _FEW) : middle + _FEW]
-    orders = min(_orders(array.ndim), key=lambda each: _bits(_differences(few, each)))
+    choices = product(range(_HIGHEST + 1), range(_HIGHEST + 1) if array.ndim > 3 else [0])
+    orders = min(choices, key=lambda each: _bits(_differences(few, each)))
     signed = _differences(whole, orders)
     data = _deflated(((signed << 1) ^ (signed >> 15)).astype("<i2").view(np.uint8).reshape(-1, 2))
     return {"shape": list(array.shape), "offset": offset.tolist(), "scale": scale, "orders": orders, "data": data}
-
-
-def _orders(ndim: int) -> list[tuple[int, int]]:
-    """Return the possible orders of differences over frames and over points."""
-    return list(product(range(_HIGHEST + 1), range(_HIGHEST + 1) if ndim > 3 else [0]))
 
 
 def _differences(whole: NDArray[np.int16], orders: tuple[int, int]) -> NDArray[np.int16]:

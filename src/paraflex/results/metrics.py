@@ -175,10 +175,6 @@ class Metric:
         """
         return [f"{self.name}.{member}" for member in members.get(self.each, ())] if self.each else [self.name]
 
-    def is_kept_of(self, runs: str) -> bool:
-        """Check whether the metric is kept for a kind of runs unless metrics are named."""
-        return runs in (self.runs if self.kept_of is None else self.kept_of)
-
     def unit_of(self, column: str, members: MetricMembers) -> str:
         """Return the unit of one of the metric's columns, for a sliding member that of the translational quantity."""
         slides = column.partition(".")[2] in members.get(sliding(self.each), ())

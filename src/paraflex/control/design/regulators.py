@@ -154,15 +154,12 @@ def _holding(model: Any, motors: Sequence[str]) -> Array:
     return np.array([point.torques[own.index(name)] if name in own else 0.0 for name in motors])
 
 
-def _is_force(name: str) -> bool:
-    """Whether an input is a force at a point of a linear model, as opposed to a motor."""
-    return name.count(".") > 1 and name.endswith((".x", ".y"))
-
-
 def _regulator(
     plant: SampledPlant, deviations: Mapping[str, float], effort: Any, integrators: Mapping[str, float], extra: Any
 ) -> Regulator:
-    usable = plant.inputs if isinstance(effort, Mapping) else [name for name in plant.inputs if not _is_force(name)]
+    # Forces at points of a linear model are named like "link.point.x", unlike motors.
+    motors = [name for name in plant.inputs if name.count(".") < 2 or not name.endswith((".x", ".y"))]
+    usable = plant.inputs if isinstance(effort, Mapping) else motors
     efforts = numbers_by_name(effort, usable, "effort", "N m or N")
     largest = numbers_by_name(deviations, plant.outputs, "deviations", "the unit of the output")
     times = numbers_by_name(integrators, plant.outputs, "integrators", "s")
