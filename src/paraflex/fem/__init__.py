@@ -23,4 +23,4 @@ from .integrals import (
 )
 from .mesh import BeamMesh as BeamMesh, mesh_beam as mesh_beam
 from .modes import ModalBasis as ModalBasis, modal_basis as modal_basis, natural_frequencies as natural_frequencies
-from .reference import ReferenceCondition as ReferenceCondition, reference_basis as reference_basis
+from .reference import ReferenceCondition as ReferenceCondition

@@ -28,9 +28,4 @@ from .kinds import (
     VERIFICATION as VERIFICATION,
     ResultKind as ResultKind,
 )
-from .lock import (
-    LOCK as LOCK,
-    FolderInUseError as FolderInUseError,
-    finish_change as finish_change,
-    lock_folder as lock_folder,
-)
+from .lock import FolderInUseError as FolderInUseError, finish_change as finish_change, lock_folder as lock_folder

@@ -37,7 +37,6 @@ from .joints import (
     SlidingJoint as SlidingJoint,
     SlotJoint as SlotJoint,
     WeldJoint as WeldJoint,
-    points_named as points_named,
 )
 from .laws import ForceLaw as ForceLaw, MotionQuantity as MotionQuantity
 from .loads import (

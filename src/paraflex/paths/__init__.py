@@ -22,4 +22,3 @@ from .paths import (
     turning_of as turning_of,
 )
 from .profiles import CruiseProfile as CruiseProfile, TrapezoidalProfile as TrapezoidalProfile
-from .reach import Shortfall as Shortfall

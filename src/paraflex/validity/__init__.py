@@ -14,11 +14,7 @@ from paraflex.integrators import Solution
 from .bending import bending_of
 from .causes import likely_cause as likely_cause, with_likely_cause as with_likely_cause
 from .indicators import (
-    AXIAL_LIMIT as AXIAL_LIMIT,
-    DRIVEN_AXIAL_LIMIT as DRIVEN_AXIAL_LIMIT,
     FOURTH_ORDER_LIMIT as FOURTH_ORDER_LIMIT,
-    SHORTENING_LIMIT as SHORTENING_LIMIT,
-    SLOPE_LIMIT as SLOPE_LIMIT,
     Following as Following,
     Indicator as Indicator,
     fourth_order as fourth_order,
