@@ -8,7 +8,7 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from functools import partial
 from itertools import pairwise
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 import scipy
@@ -34,7 +34,8 @@ _SAME_PATH = 1e-4
 _MOST_CROSSINGS = 50
 
 
-class Extreme(NamedTuple):
+@dataclass(frozen=True)
+class Extreme:
     """Extreme of a quantity: its value, and the time [s] and value of the drive's joint [rad, m] there."""
 
     value: float
@@ -84,15 +85,12 @@ class Trail:
 
     Attributes
     ----------
-    point : str
-        Name of the point.
     cusps : tuple of Cusp
         Cusps in order of time.
     crunodes : tuple of Crunode
         Crossings; none if the path retraces itself.
     """
 
-    point: str
     cusps: tuple[Cusp, ...]
     crunodes: tuple[Crunode, ...]
 
@@ -123,22 +121,14 @@ class KinematicFeatures(Brief):
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain numbers, in SI units and radians."""
-        extremes = {name: [each._asdict() for each in ends] for name, ends in self.dead_points.items()}
-        angles = [
-            {"joint": one.joint, "coupler": one.coupler, "smallest": one.smallest._asdict(),
-             "largest": one.largest._asdict()} for one in self.transmissions
-        ]  # fmt: skip
-        trails = {
-            name: {"cusps": [asdict(each) for each in one.cusps], "crunodes": [asdict(each) for each in one.crunodes]}
-            for name, one in self.trails.items()
-        }
-        return {"degrees_of_freedom": self.freedoms, "transmission_angles": angles, "dead_points": extremes,
-                "time_ratios": dict(self.time_ratios), "trails": trails}  # fmt: skip
+        names = {"freedoms": "degrees_of_freedom", "transmissions": "transmission_angles"}
+        return {names.get(name, name): value for name, value in asdict(self).items()}
 
 
 def features_of(motion: ExactMotion) -> KinematicFeatures:
     """Compute the properties of a driven motion; see `KinematicFeatures`."""
-    dead = {name: ends for name in _followers(motion) if (ends := tuple(_dead_points(motion, name)))}
+    followers = [one.name for one in motion.system.mechanism.joints if one.moves and one.name not in _driven(motion)]
+    dead = {name: ends for name in followers if (ends := tuple(_dead_points(motion, name)))}
     ratios = {}
     if motion.drive is not None and motion.drive.full_turn:
         strokes = {name: abs(ends[1].time - ends[0].time) for name, ends in dead.items() if len(ends) == 2}
@@ -150,11 +140,6 @@ def features_of(motion: ExactMotion) -> KinematicFeatures:
 
 def _driven(motion: ExactMotion) -> set[str]:
     return {one.joint for one in motion.system.mechanism.prescribed}
-
-
-def _followers(motion: ExactMotion) -> list[str]:
-    """Return the joints that move and are not driven."""
-    return [one.name for one in motion.system.mechanism.joints if one.moves and one.name not in _driven(motion)]
 
 
 def _drive_at(motion: ExactMotion, t: float) -> float | None:
@@ -265,11 +250,8 @@ def _pressure_angle(motion: ExactMotion, far: PointRef, near: PointRef, guide: J
     else:
         normal = _places(motion, far, q) - _places(motion, _ends(guide, far.body)[1], q)
     # The angle between along and normal is the transmission angle: its deviation from a right angle is wanted.
-    return np.arcsin(np.clip(_cosine(along, normal), -1.0, 1.0))
-
-
-def _cosine(a: Array, b: Array) -> Array:
-    return np.sum(a * b, axis=1) / (np.linalg.norm(a, axis=1) * np.linalg.norm(b, axis=1))
+    cosine = np.sum(along * normal, axis=1) / (np.linalg.norm(along, axis=1) * np.linalg.norm(normal, axis=1))
+    return np.arcsin(np.clip(cosine, -1.0, 1.0))
 
 
 def _places(motion: ExactMotion, ref: PointRef, q: Array) -> Array:
@@ -312,7 +294,7 @@ def _trail(motion: ExactMotion, ref: PointRef) -> Trail:
     speeds = np.linalg.norm(path.velocity, axis=1)
     fastest = float(np.max(speeds))
     if not fastest > 0.0:
-        return Trail(str(ref), (), ())
+        return Trail((), ())
 
     def gain(t: float) -> float:
         here = there(t)
@@ -332,7 +314,7 @@ def _trail(motion: ExactMotion, ref: PointRef) -> Trail:
     for t in _crossings(motion, path.position, there):
         where = _pair(there(t[0]).position[0])
         crunodes.append(Crunode(where, t, (_drive_at(motion, t[0]), _drive_at(motion, t[1]))))
-    return Trail(str(ref), tuple(cusps), tuple(crunodes))
+    return Trail(tuple(cusps), tuple(crunodes))
 
 
 def _retraced(motion: ExactMotion, there: Callable[[float], PointMotion], t: float) -> bool:

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 
 from paraflex.arrays import Array
 from paraflex.mechanism import PrescribedAngle, TimeProfile
-from paraflex.mechanism.profiles import HeldAngle
+from paraflex.mechanism.profiles import ConstantSpeed
 from .following import driven_rows
 from .joint_coordinates import joint_value
 from .signals import moment_signals
@@ -67,7 +67,9 @@ def brake(system: System, state: State, joints: Sequence[str]) -> BrakedSystem:
     InconsistentConstraintsError
         A joint is moved by a prescribed motion.
     """
-    return held_joints(system, state, {joint: HeldAngle(joint_value(system, joint, state.q)) for joint in joints})
+    return held_joints(
+        system, state, {joint: ConstantSpeed(joint_value(system, joint, state.q), 0.0) for joint in joints}
+    )
 
 
 def held_joints(system: System, state: State, profiles: Mapping[str, TimeProfile]) -> BrakedSystem:

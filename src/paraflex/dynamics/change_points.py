@@ -7,7 +7,7 @@ import scipy
 
 from paraflex.arrays import Array
 from paraflex.kernel.packed import Signals
-from paraflex.mechanism.profiles import ConstantSpeed, HeldAngle
+from paraflex.mechanism.profiles import ConstantSpeed
 from .following import driven_rows, drives_at
 from .projection import NAMED, second_rates
 from .rank import Dependence, dependence
@@ -109,7 +109,7 @@ def branches_from_rest(system: System, signals: Signals, t: float, q: Array) -> 
     """Return whether prescribed motions, all at rest, are at a change point from which two branches lead on."""
     moves = np.zeros(system.m)
     for motion, row in driven_rows(system):
-        moves[row] = not isinstance(motion.profile, HeldAngle | ConstantSpeed)
+        moves[row] = not isinstance(motion.profile, ConstantSpeed)
     if not np.any(moves):
         return False
     found = change_point_at(system, signals, t, q, system.jacobian(q), moves)

@@ -13,7 +13,7 @@ from paraflex.arrays import Array
 from paraflex.errors import AssemblyError, Moment
 from paraflex.limits import solvable
 from paraflex.mechanism import Load, PrescribedAngle, TimeProfile
-from paraflex.mechanism.profiles import HeldAngle, SampledAngle
+from paraflex.mechanism.profiles import ConstantSpeed, SampledAngle
 from .joint_coordinates import joint_coordinate, joint_value
 from .projection import LeastChange, constraint_change, project, second_rates
 from .rank import dependence
@@ -369,7 +369,7 @@ def _prescribes_all(drives: System, start: State) -> bool:
     mechanism = drives.mechanism
     taken = {prescribed.joint for prescribed in mechanism.prescribed}
     springs = {spring.joint for spring in mechanism.springs} - taken
-    locks = tuple(PrescribedAngle(f"spring of {name}", name, HeldAngle(0.0)) for name in springs)
+    locks = tuple(PrescribedAngle(f"spring of {name}", name, ConstantSpeed(0.0, 0.0)) for name in springs)
     rigid = build_system(replace(mechanism, prescribed=(*mechanism.prescribed, *locks)).rigid())
     frames = np.concatenate([start.q[body.offset : body.offset + 3] for body in drives.bodies])
     return dependence(rigid, frames).rank == rigid.n

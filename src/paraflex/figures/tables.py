@@ -177,6 +177,14 @@ def columns_of(rows: Iterable[Mapping[str, Any]], *heads: tuple[str, str, str], 
     return [Column(head, [row[name] for row in rows], unit, **more) for head, name, unit in heads]
 
 
+def table_of(title: str, heads: Sequence[tuple[str, str]], rows: Iterable[Sequence[Cell]], note: str = "") -> Table:
+    """Return the table of rows of cells, in `Table.filled` form; `heads` are heading and unit of each column."""
+    columns = list(zip(*rows, strict=True)) or [()] * len(heads)
+    return Table(
+        title, [Column(name, cells, unit) for (name, unit), cells in zip(heads, columns, strict=True)], note
+    ).filled()
+
+
 def in_row_units(columns: Sequence[Column], units: Sequence[str]) -> list[Column]:
     """Return columns whose rows have different SI units in units for display, followed by the column of these units."""
     rows = zip(*(column.cells for column in columns), strict=True)

@@ -65,19 +65,6 @@ class SampledAngle(CheckedFields):
 
 
 @dataclass(frozen=True)
-class HeldAngle:
-    """Constant angle [rad] or travel [m]."""
-
-    value: float
-    knots: tuple[float, ...] = ()
-    breaks: tuple[float, ...] = ()
-
-    def evaluate(self, t: Array) -> Values:
-        """Return the value, its rate and its acceleration at times t [s]."""
-        return np.full(t.shape, self.value), np.zeros(t.shape), np.zeros(t.shape)
-
-
-@dataclass(frozen=True)
 class ConstantSpeed(CheckedFields):
     """Profile of constant speed [rad/s or m/s] with a value at t = 0, `angle` [rad or m].
 
