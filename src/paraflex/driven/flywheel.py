@@ -90,10 +90,8 @@ def flywheel(motion: DrivenMotion, fluctuation: float) -> Flywheel:
 
 def _energy(angle: np.ndarray, torque: np.ndarray) -> tuple[float, float]:
     """Return the range of the energy within a turn [J] and the mean torque [N m], from a periodic cubic spline."""
-    closed = torque.copy()
-    closed[-1] = closed[0]
-    spline = scipy.interpolate.CubicSpline(angle, closed, bc_type="periodic") if angle[-1] > angle[0] else (
-        scipy.interpolate.CubicSpline(angle[::-1], closed[::-1], bc_type="periodic"))  # fmt: skip
+    order, closed = np.argsort(angle), np.append(torque[:-1], torque[0])
+    spline = scipy.interpolate.CubicSpline(angle[order], closed[order], bc_type="periodic")
     low, high = sorted((float(angle[0]), float(angle[-1])))
     mean = float(spline.integrate(low, high)) / (high - low)
     if abs(mean) < _ROUNDING * float(np.max(np.abs(torque))):
