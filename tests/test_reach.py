@@ -18,7 +18,7 @@ from paraflex.mechanism import (
     RigidBody,
     SampledAngle,
 )
-from paraflex.paths import Circle, Line, PointPath, follow_path, reach_shortfall
+from paraflex.paths import Circle, Line, PointPath, follow_path, path_follower
 
 UPPER, LOWER, BASE = 0.4, 0.3, np.array([0.1, 0.0])
 # Of distances: the nearest pose is a minimum, found to the root of rounding; of a second-order difference besides.
@@ -44,6 +44,12 @@ def arm(coordinates=("x", "y"), **changes):
     )
 
 
+def shortfall(mechanism, path):
+    """Distance of a path from the workspace, as errors of paths have it."""
+    follower = path_follower(mechanism, path, path.duration)
+    return follower.closure.shortfall(path, 0.0, path.duration, follower.assembled)
+
+
 def refused(mechanism, path, samples=101, **keywords):
     with pytest.raises(UnreachablePathError) as caught:
         follow_path(mechanism, path, np.linspace(0.0, path.duration, samples), **keywords)
@@ -52,7 +58,7 @@ def refused(mechanism, path, samples=101, **keywords):
 
 def test_an_arm_reaches_an_annulus():
     path = Line((0.5, 0.3), (0.9, 0.9), 2.0)
-    found = reach_shortfall(arm(), path)
+    found = shortfall(arm(), path)
     r = np.linalg.norm(path.evaluate(found.t).position - BASE, axis=1)
     np.testing.assert_allclose(found.distance, np.maximum(r - UPPER - LOWER, 0.0), **CLOSE)
     error = refused(arm(), path)
@@ -64,7 +70,7 @@ def test_an_arm_reaches_an_annulus():
 def test_the_hole_in_the_middle_counts():
     # Past the base, at some distance: out of reach on the way only.
     path = Line((0.4, 0.05), (-0.3, 0.05), 2.0)
-    found = reach_shortfall(arm(), path)
+    found = shortfall(arm(), path)
     r = np.linalg.norm(path.evaluate(found.t).position - BASE, axis=1)
     np.testing.assert_allclose(found.distance, np.maximum(UPPER - LOWER - r, 0.0), **CLOSE)
     # The nearest place to the base is 0.05 m off it; instants looked at are a hundredth of the path apart there.
@@ -81,7 +87,7 @@ def test_two_arms_reach_what_both_annuli_hold(name, end, nearest):
         on_arm = np.array([-0.1, 0.0]) + 0.5 * np.array([end[0] + 0.1, end[1]]) / np.hypot(end[0] + 0.1, end[1])
         assert np.linalg.norm(on_arm - [0.1, 0.0]) < 0.5
     np.testing.assert_allclose(refused(mechanism, path).shortfall, expected, **CLOSE)
-    assert not np.any(reach_shortfall(mechanism, Circle((0.0, 0.3), 0.05, 5.0)).out)
+    assert not np.any(shortfall(mechanism, Circle((0.0, 0.3), 0.05, 5.0)).out)
 
 
 def test_a_start_out_of_reach_says_how_far():
@@ -106,7 +112,7 @@ def test_prescribed_motions_move_what_can_be_reached():
         lambda t: 0.6 + 0.4 * np.sin(9 * t), lambda t: 3.6 * np.cos(9 * t), lambda t: -32.4 * np.sin(9 * t)
     )
     driven, path = arm(("y",), prescribed=(PrescribedAngle("drive", "O", law),)), Line((0.0, 0.4), (0.0, 0.9), 2.0)
-    found = reach_shortfall(driven, path)
+    found = shortfall(driven, path)
     highest = UPPER * np.sin(law.evaluate(found.t)[0]) + LOWER
     np.testing.assert_allclose(
         found.distance, np.maximum(path.evaluate(found.t).position[:, 1] - highest, 0.0), **CLOSE
@@ -129,7 +135,7 @@ def test_a_slider_reaches_as_far_as_crank_and_rod():
         assemblies=(Assembly("up", {"crank": 1.0, "rod": -0.3, "block": 0.0}),),
     )
     path = Line((0.3, 0.0), (0.45, 0.0), 2.0)
-    found = reach_shortfall(mechanism, path)
+    found = shortfall(mechanism, path)
     wanted = path.evaluate(found.t).position[:, 0]
     np.testing.assert_allclose(found.distance, np.maximum(wanted - crank - rod, 0.0), **CLOSE)
     error = refused(mechanism, path)
@@ -185,4 +191,4 @@ def test_a_way_through_the_base_passes_a_singular_position():
 def test_an_assembly_out_of_reach_says_how_far_apart_its_joints_stay():
     wide = replace(rocker(1.9), ground={"O": (0.0, 0.0), "D": (0.8, 0.0)})
     with pytest.raises(AssemblyError, match=r"the loops do not close: a gap of 0\.15 m remains in D at"):
-        reach_shortfall(wide, PointPath(((0.0, 0.0, 1.0), (1.0, 0.0, 1.5)), 1.0))
+        shortfall(wide, PointPath(((0.0, 0.0, 1.0), (1.0, 0.0, 1.5)), 1.0))

@@ -6,7 +6,6 @@ from .closure import (
     follow_path as follow_path,
     path_follower as path_follower,
     pose_at as pose_at,
-    reach_shortfall as reach_shortfall,
 )
 from .model import ModelWithPaths as ModelWithPaths
 from .paths import (

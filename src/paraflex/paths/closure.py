@@ -224,40 +224,6 @@ class PathFollower:
         return replace(self, path=path)
 
 
-def reach_shortfall(
-    mechanism: Mechanism,
-    path: Path,
-    times: Sequence[float] | Array | None = None,
-    *,
-    assembly: str | Assembly | None = None,
-    orientation: float = 0.0,
-) -> Shortfall:
-    """Compute the distance of a path from the workspace, zero at every instant of a path inside it.
-
-    It is the distance from the desired position to the nearest pose that joints and prescribed motions allow. The
-    search starts at the pose of the assembly and follows the path; other poses are used where they come nearer. A path
-    within reach may still be impossible to follow: past a Type I singularity poses continue in another assembly, which
-    `follow_path` rejects.
-
-    Parameters
-    ----------
-    mechanism, path, assembly, orientation
-        Arguments of `follow_path`.
-    times : (k,) array, optional
-        Instants, ascending [s]; by default 41 over the path, its knots, and some more about the largest distance.
-
-    Raises
-    ------
-    InputError, AssemblyError
-        Same causes as in `follow_path`.
-    """
-    follower = path_follower(mechanism, path, path.duration, assembly=assembly, orientation=orientation)
-    closure, pose = follower.closure, follower.assembled
-    if times is None:
-        return closure.shortfall(path, 0.0, path.duration, pose)
-    return closure.distances(path, np.asarray(times, dtype=float), pose)
-
-
 class PathClosure(LoopClosure):
     """Rigid system with its task marker, whose loops are closed along a path."""
 
@@ -336,7 +302,11 @@ class PathClosure(LoopClosure):
         raise self._unreachable(cause, detail, found, at, motion.t.size, motion)
 
     def shortfall(self, path: Path, start: float, end: float, pose: Array) -> Shortfall:
-        """Return the distance of a path from the workspace, from a pose near its start onwards."""
+        """Return the distance of a path from the workspace, from a pose near its start onwards.
+
+        It is that from the desired position to the nearest pose that joints and prescribed motions allow. A path within
+        reach may still be impossible to follow: past a Type I singularity poses continue in another assembly.
+        """
         end = max(start, min(end, path.duration))
         knots = [knot for knot in path.knots if start < knot < end]
         times = np.unique([*np.linspace(start, end, _INSTANTS_LOOKED_AT), *knots])
