@@ -18,7 +18,7 @@ from paraflex.seals import damaged
 from .charts import Axis, Chart, Curve, Mark, is_wide, look, stairs
 from .entry import figure
 from .selection import place_of
-from .tables import Column, Table
+from .tables import Table, table_of
 
 # Metrics by which designs are not chosen: those of the solver, and those for which smaller is not always better.
 _NOT_JUDGED = tuple(metric.name for metric in METRICS.values() if metric.of_solver or not metric.ranked)
@@ -348,7 +348,5 @@ def failure_table(table: DesignTable) -> Table:
     rows = [(status or NO_VALUE, len(texts), texts[0]) for (status, _), texts in most[:_MOST_REASONS]]
     if left := sum(len(texts) for _, texts in most[_MOST_REASONS:]):
         rows.append((NO_VALUE, left, "other reasons; the table has them"))
-    columns = [[row[k] for row in rows] for k in range(3)]
-    return Table("Runs that are not complete", [
-        Column("status", columns[0]), Column("runs", columns[1]), Column("reason", columns[2], "one of those alike"),
-    ])  # fmt: skip
+    heads = [("status", ""), ("runs", ""), ("reason", "one of those alike")]
+    return table_of("Runs that are not complete", heads, rows)

@@ -32,7 +32,7 @@ from paraflex.units import DisplayUnit
 from .charts import DASHED, DOTTED, N_COLOURS, PLAIN_LOOK, Axis, Chart, Curve, Look, Span, look
 from .entry import NOTHING, figure
 from .selection import names_of, place_of
-from .tables import Column, Table
+from .tables import Column, Table, table_of
 
 # Rows of poles: mode, state of its motors, and poles.
 Row = tuple[str, str, Complex]
@@ -212,9 +212,8 @@ def tables(data: xr.Dataset) -> Iterator[Table]:
     rows = held_rows(data)
     yield _frequency_table(rows)
     if not all(one.on_axis for _, _, poles in rows for one in roots(poles)):
-        columns = [Column("mode", [mode for mode, _, _ in rows]), Column("motors", [held for _, held, _ in rows]),
-                   Column("lowest", [_lowest(poles) for _, _, poles in rows])]  # fmt: skip
-        yield Table("Poles", columns, _ROOTS_NOTE)
+        cells = [(mode, held, _lowest(poles)) for mode, held, poles in rows]
+        yield table_of("Poles", [("mode", ""), ("motors", ""), ("lowest", "")], cells, _ROOTS_NOTE)
     for name in names_of(data, "map"):
         modes = names_of(data, "mode")
         zeros = [zeros_of(data, mode, name) for mode in modes]
