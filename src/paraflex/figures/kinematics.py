@@ -11,7 +11,7 @@ from paraflex.arrays import Array
 from paraflex.formatting import display_unit, number, quantity, text_symbol
 from paraflex.results.kinematics import KINEMATICS
 from .selection import names_of
-from .tables import Column, Table
+from .tables import Table, table_of
 
 # Largest number of points that are listed.
 _MOST_POINTS = 30
@@ -53,38 +53,42 @@ def kinematics_tables(data: xr.Dataset) -> Iterator[Table]:
 def kinematics_tiles(data: xr.Dataset) -> list[tuple[str, str, str]]:
     """Return the main numbers of a driven motion: range of the drive, smallest transmission angle, time ratio."""
     found, tiles = kinematics_of(data), []
-    key, where, unit = _place(found)
+    key, (at_drive, unit) = _place(found)
     if drive := found["drive"]:
         shown = display_unit(unit, max(abs(drive["start"]), abs(drive["end"])))
         ends = [number(drive[end], factor=shown.factor) for end in ("start", "end")]
         turn = "a whole turn, " if drive["full_turn"] else ""
         tiles.append(
-            (f"{where} moves", f"{' to '.join(ends)} {shown.name}", f"{turn}at {quantity(drive['speed'], unit + '/s')}")
+            (
+                f"{drive['joint']} moves",
+                f"{' to '.join(ends)} {shown.name}",
+                f"{turn}at {quantity(drive['speed'], unit + '/s')}",
+            )
         )
     if angles := found["transmission_angles"]:
         least = min(angles, key=lambda one: one["smallest"]["value"])
         at = quantity(least["smallest"][key], unit, padded=False)
         tiles.append(("smallest transmission angle", quantity(least["smallest"]["value"], "rad"),
-                      f"joint {text_symbol(least['joint'])} at {where} = {at}"))  # fmt: skip
+                      f"joint {text_symbol(least['joint'])} {at_drive} = {at}"))  # fmt: skip
     if ratios := found["time_ratios"]:
         joint = max(ratios, key=lambda name: ratios[name])
         tiles.append(("largest time ratio", number(ratios[joint]), f"joint {text_symbol(joint)}"))
     return tiles
 
 
-def _place(found: Found) -> tuple[str, str, str]:
-    """Return entry, heading and unit of positions in tables: those of the drive, or times without constant speed."""
+def _place(found: Found) -> tuple[str, tuple[str, str]]:
+    """Return entry, and heading and unit of positions in tables: of the drive, or times without constant speed."""
     drive = found["drive"]
-    return ("time", "t", "s") if drive is None else ("drive", drive["joint"], drive["unit"])
+    return ("time", ("at t", "s")) if drive is None else ("drive", (f"at {drive['joint']}", drive["unit"]))
 
 
 def _joints(data: xr.Dataset, found: Found, title: str, unit: str) -> Table:
     """Return the table of the ranges of joints with coordinates in a unit that move, sharp where they reverse."""
-    key, where, place_unit = _place(found)
-    rows, coordinates = [], data["joint_coordinate"]
+    key, at = _place(found)
+    rows, coordinates, drive = [], data["joint_coordinate"], found["drive"]
     # Smaller travels are rounding beside the ranges of points.
     size = 1.0 if unit == "rad" else float(np.max(np.ptp(data["point_position"].values, axis=0), initial=0.0))
-    places = data["time"].values if found["drive"] is None else coordinates.sel(joint=where).values
+    places = data["time"].values if drive is None else coordinates.sel(joint=drive["joint"]).values
     for joint in names_of(data, "joint"):
         values = coordinates.sel(joint=joint).values
         values = np.where(np.abs(values) < _SAME * np.ptp(values), 0.0, values)
@@ -92,41 +96,29 @@ def _joints(data: xr.Dataset, found: Found, title: str, unit: str) -> Table:
             continue
         ends = [(float(values[k]), float(places[k])) for k in (int(np.argmin(values)), int(np.argmax(values)))]
         ends += [(end["value"], end[key]) for end in found["dead_points"].get(joint, ())]
-        ends = [(0.0 if abs(value) < _SAME * np.ptp(values) else value, at) for value, at in ends]
+        ends = [(0.0 if abs(value) < _SAME * np.ptp(values) else value, place) for value, place in ends]
         rows.append((joint, *min(ends), *max(ends), found["time_ratios"].get(joint)))
-    columns = list(zip(*rows, strict=True)) if rows else [()] * 6
-    at, shown = f"at {where}", display_unit(unit, [*columns[1], *columns[3]])
-    return Table(title, [
-        Column("joint", columns[0]),
-        Column("lowest", columns[1], unit, shown=shown), Column(at, columns[2], place_unit),
-        Column("highest", columns[3], unit, shown=shown), Column(at, columns[4], place_unit),
-        Column("time ratio", columns[5]),
-    ]).filled()  # fmt: skip
+    heads = [("joint", ""), ("lowest", unit), at, ("highest", unit), at, ("time ratio", "")]
+    return table_of(title, heads, rows, alike=("lowest", "highest"))
 
 
 def _dead_points(found: Found) -> Table:
     """Return the table of the dead points of joints that have more than two."""
-    key, where, unit = _place(found)
-    rows = [(joint, found["joint_units"][joint], each["value"], each[key])
-            for joint, ends in found["dead_points"].items() if len(ends) > 2 for each in ends]  # fmt: skip
-    return Table("Dead points", [
-        Column("joint", [row[0] for row in rows]),
-        Column("angle", [row[2] if row[1] == "rad" else None for row in rows], "rad"),
-        Column("travel", [row[2] if row[1] == "m" else None for row in rows], "m"),
-        Column(f"at {where}", [row[3] for row in rows], unit),
-    ]).filled()  # fmt: skip
+    key, at = _place(found)
+    rows = [
+        (joint, *(each["value"] if found["joint_units"][joint] == unit else None for unit in ("rad", "m")), each[key])
+        for joint, ends in found["dead_points"].items() if len(ends) > 2 for each in ends
+    ]  # fmt: skip
+    return table_of("Dead points", [("joint", ""), ("angle", "rad"), ("travel", "m"), at], rows)
 
 
 def _transmissions(found: Found) -> Table:
-    key, where, unit = _place(found)
-    rows, at = found["transmission_angles"], f"at {where}"
-    return Table("Transmission angles", [
-        Column("joint", [one["joint"] for one in rows]), Column("coupler", [one["coupler"] for one in rows]),
-        Column("smallest", [one["smallest"]["value"] for one in rows], "rad"),
-        Column(at, [one["smallest"][key] for one in rows], unit),
-        Column("largest", [one["largest"]["value"] for one in rows], "rad"),
-        Column(at, [one["largest"][key] for one in rows], unit),
-    ])  # fmt: skip
+    key, at = _place(found)
+    ends = [(end, name) for end in ("smallest", "largest") for name in ("value", key)]
+    rows = [(one["joint"], one["coupler"], *(one[end][name] for end, name in ends))
+            for one in found["transmission_angles"]]  # fmt: skip
+    heads = [("joint", ""), ("coupler", ""), ("smallest", "rad"), at, ("largest", "rad"), at]
+    return table_of("Transmission angles", heads, rows)
 
 
 def _points(data: xr.Dataset) -> Table:
@@ -145,40 +137,28 @@ def _points(data: xr.Dataset) -> Table:
             ends[np.abs(ends) < least] = 0.0
             rows.append((point, *ends.ravel().tolist(), *most))
             seen.append(places)
-    columns = list(zip(*rows, strict=True)) if rows else [()] * 7
+    heads = [("point", ""), ("x from", "m"), ("x to", "m"), ("y from", "m"), ("y to", "m"), ("top speed", "m/s"),
+             ("top acceleration", "m/s^2")]  # fmt: skip
+    note = "Ranges, and the largest speed and acceleration, at the samples."
     # An end of a range may be as close to zero as the samples happen to come.
-    shown = display_unit("m", [end for ends in columns[1:5] for end in ends])
-    return Table("Points", [
-        Column("point", columns[0]),
-        *(Column(name, columns[k], "m", shown=shown) for k, name in enumerate(("x from", "x to", "y from", "y to"), 1)),
-        Column("top speed", columns[5], "m/s"), Column("top acceleration", columns[6], "m/s^2"),
-    ], note="Ranges, and the largest speed and acceleration, at the samples.")  # fmt: skip
+    return table_of("Points", heads, rows, note, alike=("x from", "x to", "y from", "y to"))
 
 
 def _special(found: Found) -> Table:
     """Return the table of cusps and crunodes of coupler curves."""
-    key, where, unit = _place(found)
-    several = f"{key}s"
+    key, at = _place(found)
     rows = [
-        (point, kind, *each["position"], each[key] if kind == "cusp" else each[several][0],
-         None if kind == "cusp" else each[several][1])
+        (point, kind, *each["position"], *((each[key], None) if kind == "cusp" else each[f"{key}s"]))
         for point, trail in found["trails"].items() for kind in ("cusp", "crunode") for each in trail[f"{kind}s"]
     ]  # fmt: skip
-    columns = list(zip(*rows, strict=True)) if rows else [()] * 6
-    shown = display_unit("m", [*columns[2], *columns[3]])
-    return Table("Special points of coupler curves", [
-        Column("point", columns[0]), Column("kind", columns[1]),
-        Column("x", columns[2], "m", shown=shown), Column("y", columns[3], "m", shown=shown),
-        Column(f"at {where}", columns[4], unit), Column("and at", columns[5], unit),
-    ]).filled()  # fmt: skip
+    heads = [("point", ""), ("kind", ""), ("x", "m"), ("y", "m"), at, ("and at", at[1])]
+    return table_of("Special points of coupler curves", heads, rows, alike=("x", "y"))
 
 
 def _assemblies(found: Found) -> Table:
     """Return the table of the assemblies that were searched for: angles of all bodies at the start."""
-    rows = found.get("assemblies", [])
-    bodies = list(rows[0]["angles"]) if rows else []
-    return Table("Assemblies", [
-        Column("assembly", list(range(1, len(rows) + 1))),
-        *(Column(body, [one["angles"][body] for one in rows], "rad") for body in bodies),
-        Column("found", [one["found"] for one in rows]),
-    ], note="With the drive at its start, that of the motion first; found: random starts that led to it.")  # fmt: skip
+    assemblies = found.get("assemblies", [])
+    rows = [(k, *one["angles"].values(), one["found"]) for k, one in enumerate(assemblies, start=1)]
+    bodies = [(body, "rad") for one in assemblies[:1] for body in one["angles"]]
+    note = "With the drive at its start, that of the motion first; found: random starts that led to it."
+    return table_of("Assemblies", [("assembly", ""), *bodies, ("found", "")], rows, note)

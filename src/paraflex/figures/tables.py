@@ -9,7 +9,7 @@ from typing import Any, TypeGuard
 
 import numpy as np
 
-from paraflex.formatting import NO_VALUE, common_unit, error_text, number
+from paraflex.formatting import NO_VALUE, common_unit, display_unit, error_text, number
 from paraflex.units import DisplayUnit
 
 Cell = float | int | str | None
@@ -177,12 +177,21 @@ def columns_of(rows: Iterable[Mapping[str, Any]], *heads: tuple[str, str, str], 
     return [Column(head, [row[name] for row in rows], unit, **more) for head, name, unit in heads]
 
 
-def table_of(title: str, heads: Sequence[tuple[str, str]], rows: Iterable[Sequence[Cell]], note: str = "") -> Table:
-    """Return the table of rows of cells, in `Table.filled` form; `heads` are heading and unit of each column."""
-    columns = list(zip(*rows, strict=True)) or [()] * len(heads)
-    return Table(
-        title, [Column(name, cells, unit) for (name, unit), cells in zip(heads, columns, strict=True)], note
-    ).filled()
+def table_of(
+    title: str, heads: Sequence[tuple[str, str]], rows: Iterable[Sequence[Cell]], note: str = "",
+    alike: Sequence[str] = (),
+) -> Table:  # fmt: skip
+    """Return the table of rows of cells, without columns of numbers that have no value.
+
+    Heads are heading and unit of each column; columns with the headings `alike` are in one unit, that of their largest
+    value.
+    """
+    cells = list(zip(*rows, strict=True)) or [()] * len(heads)
+    columns = [Column(name, each, unit) for (name, unit), each in zip(heads, cells, strict=True)]
+    if some := [column for column in columns if column.name in alike]:
+        shown = display_unit(some[0].unit, [value for column in some for value in column.values])
+        columns = [replace(column, shown=shown) if column.name in alike else column for column in columns]
+    return Table(title, columns, note).filled()
 
 
 def in_row_units(columns: Sequence[Column], units: Sequence[str]) -> list[Column]:
