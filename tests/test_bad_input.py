@@ -294,7 +294,9 @@ def test_files_that_are_no_models(tmp_path, name):
 
 def test_a_folder_and_a_missing_file(tmp_path):
     (tmp_path / "model.toml").mkdir()
-    with pytest.raises(InputError, match=r"model\.toml: file: cannot be read \(is a directory\); check its name"):
+    with pytest.raises(
+        InputError, match=r"model\.toml: file: cannot be read \(is a directory\); name a TOML file, not a folder"
+    ):
         load(tmp_path / "model.toml")
     with pytest.raises(InputError, match=r"none\.toml: file: cannot be read \(no such file or directory\)"):
         load(tmp_path / "none.toml")

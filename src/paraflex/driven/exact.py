@@ -17,7 +17,7 @@ from paraflex.errors import listed
 from paraflex.formatting import quantity
 from paraflex.integrators import Solution
 from paraflex.kernel.closure import LOOPS_CLOSED
-from paraflex.mechanism import ConstantSpeed
+from paraflex.mechanism import ConstantSpeed, Mechanism
 from paraflex.paths import RigidMotion
 from paraflex.paths.closure import PathClosure
 from paraflex.paths.loops import ClosedLoops, LoopClosure
@@ -45,9 +45,17 @@ def no_target(times: Array) -> Array:
     return np.zeros((times.size, 3, 0))
 
 
-def width_beside(drive: "Drive | None", end: float) -> float:
-    """Return the time before and after a change point over which a motion until `end` is interpolated [s]."""
-    return _BESIDE * (2.0 * math.pi / drive.speed if drive is not None and drive.unit == "rad" else end)
+def width_beside(drive: "Drive | None", end: float, mechanism: Mechanism | None = None) -> float:
+    """Return the time before and after a change point over which a motion until `end` is interpolated [s].
+
+    Without a drive, the fastest of a mechanism's prescribed motions that turn tells the time of a turn.
+    """
+    if drive is not None:
+        return _BESIDE * (2.0 * math.pi / drive.speed if drive.unit == "rad" else end)
+    times = np.linspace(0.0, end, 181)
+    turning = [one.profile for one in mechanism.prescribed if not mechanism.slides(one.joint)] if mechanism else []
+    fastest = max((float(np.max(np.abs(one.evaluate(times)[1]))) for one in turning), default=0.0)
+    return _BESIDE * max(end, min(2.0 * math.pi / fastest, 90.0 * end) if fastest else 0.0)
 
 
 def placed(drive: "Drive | None", times: Sequence[float]) -> tuple[str, str]:
@@ -264,6 +272,11 @@ class ExactMotion(Brief):
         return partial(self.loops.target, self.rigid.path)
 
     @cached_property
+    def beside(self) -> float:
+        """See `width_beside`."""
+        return width_beside(self.drive, float(self.solution.t[-1]), self.loops.mechanism)
+
+    @cached_property
     def mobility(self) -> Mobility:
         """Degrees of freedom without the drives, and redundant constraints, at the first sample."""
         mechanism = replace(self.loops.system.mechanism, prescribed=())
@@ -271,8 +284,7 @@ class ExactMotion(Brief):
 
     def at(self, t: float) -> ExactState:
         """Return the motion (1, n) at a time within the samples [s], exact to rounding."""
-        times = self.solution.t
-        beside = width_beside(self.drive, float(times[-1]))
+        times, beside = self.solution.t, self.beside
         k = int(np.clip(np.searchsorted(times, t) - 1, 0, times.size - 1))
         # The motion does not start from samples near a change point.
         while k > 0 and any(abs(times[k] - one) <= beside for one in self.passed):

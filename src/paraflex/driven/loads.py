@@ -82,7 +82,7 @@ def with_limits(motion: ExactMotion, solution: Solution) -> tuple[Solution, list
     """
     system, drive, multipliers = motion.system, motion.drive, solution.multipliers.copy()
     last, without = float(solution.t[-1]), dict[tuple[str, ...], list[float]]()
-    width = _BEYOND * width_beside(drive, last)
+    width = _BEYOND * width_beside(drive, last, system.mechanism)
     for passed in motion.passed:
         near, far = sorted((passed, last - passed))
         steps = min(width, 0.5 * near) * np.array([-2.0, -1.0, 1.0, 2.0])

@@ -287,7 +287,7 @@ def followed(
     grid, keep = times, np.ones(times.size, dtype=bool)
     if law is not None:
         grid, keep = no_long_steps(times, _STEP * law.duration / max(law.turns, 1.0))
-    beside = width_beside(law, float(times[-1]))
+    beside = width_beside(law, float(times[-1]), loops.mechanism)
     found, passed = follow_past(loops, no_target, grid, keep, first, beside)
     if not found.closed:
         raise _barred(law, loops, found.last, found.stopped)

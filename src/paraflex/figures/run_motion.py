@@ -279,7 +279,7 @@ def point_paths(data: xr.Dataset, points: Sequence[str] = ()) -> Iterator[Chart]
     chart = _in_the_plane(chart, data, "point_position", points)
     drawn = {curve.name for curve in chart.curves}
     places = {kind: special_points(data, kind, drawn).T for kind in ("cusp", "crunode")}
-    marks = [Curve(kind, y, x, mark="triangle" if kind == "cusp" else "diamond")
+    marks = [Curve(kind, y, x, mark="cross" if kind == "cusp" else "ring")
              for kind, (x, y) in places.items() if x.size]  # fmt: skip
     yield replace(chart, curves=[*chart.curves, *marks])
 

@@ -14,7 +14,6 @@ import numpy as np
 
 from paraflex.arrays import Array, Brief
 from paraflex.errors import InputError, suggestion
-from paraflex.figures.kinematics import coupler_points
 from paraflex.figures.selection import names_of, point_number, select_run
 from paraflex.figures.shapes import figure_of
 from paraflex.folders import RESULT_KINDS
@@ -361,7 +360,12 @@ def followed_stations(run: Run, given: Sequence[str] = ()) -> tuple[int, ...]:
     points = names_of(run, "point")
     stations = run["point_station"].values
     effector = run.attrs.get("end_effector_point")
-    given = given or ([effector] if effector in points else coupler_points(run.attrs))
+    if not given and effector in points:
+        given = [effector]
+    elif not given and "kinematics" in run.attrs:
+        from paraflex.figures.kinematics import coupler_points  # imports xarray, which drawings need not have
+
+        given = coupler_points(run.attrs)
     if given:
         return tuple(int(stations[point_number(run, point)]) for point in given)
     shape, joints = run["shape"].values.astype(float), run["joint_position"].values.astype(float)
