@@ -14,7 +14,7 @@ import numpy as np
 import xarray as xr
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import FixedLocator, LogLocator, NullFormatter, NullLocator
+from matplotlib.ticker import FixedLocator, LogLocator, MaxNLocator, NullFormatter, NullLocator
 
 from paraflex.arguments import checked_arguments
 from paraflex.arrays import Array
@@ -41,6 +41,8 @@ _DECADES = 9.0
 _WIDE = {"x": 40.0, "y": 200.0}
 # Difference, in the unit of the axis, below which data are constant up to rounding.
 _NOTHING = 1e-9
+# Steps of ticks of angles, times a power of ten [deg].
+_DEGREES = [1, 1.5, 2, 3, 4.5, 6, 9, 10]
 _ZERO: dict[str, Any] = {"color": "0.7", "linewidth": 0.5, "zorder": 0.5}
 
 
@@ -75,6 +77,8 @@ def set_scale(
             middle = 0.5 * (low + high) if math.isfinite(low) and max(abs(low), abs(high)) > _NOTHING else 0.0
             half = 0.052 * scale if scale > _NOTHING else 1.04
             set_limits(middle - half, middle + half)
+    if unit.name == "deg" and own.get_scale() == "linear":
+        own.set_major_locator(MaxNLocator(steps=_DEGREES))
     if axis.low is not None:
         set_limits(unit.factor * axis.low, None)
     if axis.high is not None:
