@@ -34,8 +34,10 @@ from .features import KinematicFeatures, features_of
 from .loads import LIMITS_RIGHT_TO, RIGHT_TO, load_errors, with_limits, with_loads
 from .ranges import Wish, check_determined, chosen_drive, driven_loops, followed, freedoms_at, ranged
 
-# Samples between which properties are located: of a drive, and at most for other motions.
+# Samples between which properties are located: of a travel or a turn of a drive, and at most for other motions.
 _FINE, _FINEST = 361, 1441
+# Part of a turn by which a whole number of turns may be missed.
+_WHOLE = 1e-9
 
 
 @named_in_errors("a driven motion", "the motion that kinematics returns")
@@ -91,13 +93,15 @@ class DrivenMotion(MotionRun):
 
     @cached_property
     def exact(self) -> ExactMotion:
-        """The motion at any time, exact to rounding: over one turn of the drive, with samples of its own."""
+        """The motion at any time, exact to rounding, with samples of its own, until it repeats."""
         drive, solution = self.drive, self.solution
-        one_turn = drive is not None and drive.alone
-        if one_turn and drive is not None and drive.turns > 1.0:
-            drive = replace(drive, end=drive.start + math.copysign(2.0 * math.pi, drive.end - drive.start))
         end = float(solution.t[-1]) if drive is None else drive.duration
-        times = np.linspace(0.0, end, _FINE if one_turn else int(np.clip(solution.t.size, _FINE, _FINEST)))
+        one = drive is not None and drive.alone
+        times = np.linspace(0.0, end, _FINE if one else int(np.clip(solution.t.size, _FINE, _FINEST)))
+        if drive is not None and drive.turns > 1.0 + _WHOLE:
+            # Whole turns are samples.
+            pieces = np.arange(math.ceil((_FINE - 1) * (drive.turns - _WHOLE)))
+            times = np.append(pieces * 2.0 * math.pi / ((_FINE - 1) * drive.speed), end)
         passed, rigid = self.passed, self.rigid
         if times.size != solution.t.size or times[-1] != solution.t[-1]:
             if rigid is None:
@@ -109,7 +113,14 @@ class DrivenMotion(MotionRun):
                 rigid = PathFollower(self.loops, solution.q[0], rigid.path)(times)
                 t, q, v, a = rigid.t, rigid.q, rigid.v, rigid.a
             solution = replace(solution, t=t, q=q, v=v, a=a)
-        return ExactMotion(self.system, solution, drive, self.loops, rigid, passed)
+        exact = ExactMotion(self.system, solution, drive, self.loops, rigid, passed)
+        for k in range(_FINE - 1, times.size - 1, _FINE - 1):
+            if drive is not None and exact.repeats_at(k):
+                solution = replace(solution, **{name: getattr(solution, name)[: k + 1] for name in "tqva"})
+                drive = replace(drive, end=drive.at(times[k]))
+                passed = tuple(t for t in passed if t <= times[k])
+                return replace(exact, solution=solution, drive=drive, passed=passed)
+        return exact
 
     @cached_property
     def features(self) -> KinematicFeatures:
