@@ -14,6 +14,8 @@ import paraflex as pf
 from paraflex.errors import InputError, UnreachablePathError
 from paraflex.figures.run_motion import point_paths
 from paraflex.figures.selection import as_runs
+from paraflex.reports.loads import load_tiles
+from paraflex.results.loads import joint_line, load_figures
 from shell import paraflex
 
 REFERENCE = {
@@ -596,6 +598,12 @@ def test_forces_at_a_change_point_are_the_limit_of_those_beside_it(half):
     assert float(at["drive_torque"].sel(drive="O")) == pytest.approx(-2.0 * 9.81 * 0.1, rel=1e-7)
     assert [one.code for one in motion.findings] == ["special-pose", "loads-unbounded"]
     assert "forces in O, A, B, Q grow without bound towards O at 3.14159 rad" in motion.findings[-1].text
+    # The largest sample of these forces is not their maximum. That of the torque is one.
+    figures = load_figures(pf.motion_dataset(motion))
+    assert [(one["force_max"], one["force_unbounded"]) for one in figures["joints"].values()] == 4 * [(None, True)]
+    assert figures["drives"]["O"]["torque_max"] == pytest.approx(2.0 * 9.81 * 0.1, rel=1e-2)
+    assert joint_line({"": figures}) == "largest joint force: unbounded in O, A, B, Q"
+    assert load_tiles({"": figures})[-1] == ("largest joint force", "unbounded", "O, A, B, Q")
 
 
 def test_a_flywheel_takes_samples_at_change_points():

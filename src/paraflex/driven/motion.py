@@ -357,11 +357,13 @@ def torques(
         raise InputError("has no effect without a path", field="mode", value=mode, remedy=remedy)
     solution = with_loads(motion.system, motion.solution, effort)
     notes = [*motion.notes, *shared_loads(motion.system, solution)]
+    grows = np.zeros(motion.system.m, dtype=bool)
     if motion.passed:
         exact = ExactMotion(motion.system, motion.solution, motion.drive, motion.loops, passed=motion.passed)
-        solution, unbounded = with_limits(exact, solution)
+        solution, grows, unbounded = with_limits(exact, solution)
         notes += unbounded
     errors = load_errors(motion.system, solution.multipliers, LIMITS_RIGHT_TO if motion.passed else RIGHT_TO)
+    errors[grows] = math.inf
     solution = replace(solution, multiplier_errors=errors)
     return replace(motion, solution=solution, effort=effort, mode=name, notes=tuple(notes))
 
