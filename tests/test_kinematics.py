@@ -606,6 +606,27 @@ def test_forces_at_a_change_point_are_the_limit_of_those_beside_it(half):
     assert load_tiles({"": figures})[-1] == ("largest joint force", "unbounded", "O, A, B, Q")
 
 
+def test_torques_between_samples_are_examined():
+    motion = pf.torques(pf.load("four_bar"), "O", speed=10.0, samples=5)
+    (found,) = motion.findings
+    assert (found.code, found.place) == ("samples-coarse", "samples")
+    fine = pf.motion_dataset(pf.torques(pf.load("four_bar"), "O", speed=10.0, samples=3601))
+    torques = [float(np.max(np.abs(data["drive_torque"]))) for data in (pf.motion_dataset(motion), fine)]
+    said = re.search(r"torque of \S+ is up to (\S+) N m in them and (\S+) N m", found.text)
+    assert said is not None
+    assert [float(each) for each in said.groups()] == pytest.approx(torques, rel=1e-3)
+    enough = int(found.remedy.split()[-1])
+    assert pf.torques(pf.load("four_bar"), "O", speed=10.0, samples=enough).findings == ()
+    # Along a path motors give the torques. Forces that grow without bound are left out, others at change points not.
+    along = pf.torques(pf.load("five_bar"), mode="++", samples=9)
+    assert [one.code for one in along.findings] == ["samples-coarse"]
+    assert "the torque of motor left is up to" in along.findings[0].text
+    gravity = replace(HEAVY, gravity=(0.0, -9.81))
+    for samples in (7, 361):
+        past = pf.torques(gravity, "O", start=math.pi / 3, samples=samples)
+        assert [one.code for one in past.findings] == ["special-pose", "loads-unbounded"]
+
+
 def test_a_flywheel_takes_samples_at_change_points():
     gravity = replace(HEAVY, gravity=(0.0, -9.81))
     at, beside = (pf.torques(gravity, "O", start=math.radians(start), speed=10.0) for start in (30.0, 30.3))
