@@ -14,6 +14,8 @@ import paraflex as pf
 from paraflex.errors import InputError, UnreachablePathError
 from paraflex.figures.run_motion import point_paths
 from paraflex.figures.selection import as_runs
+from paraflex.reports.loads import load_tiles
+from paraflex.results.loads import joint_line, load_figures
 from shell import paraflex
 
 REFERENCE = {
@@ -596,6 +598,33 @@ def test_forces_at_a_change_point_are_the_limit_of_those_beside_it(half):
     assert float(at["drive_torque"].sel(drive="O")) == pytest.approx(-2.0 * 9.81 * 0.1, rel=1e-7)
     assert [one.code for one in motion.findings] == ["special-pose", "loads-unbounded"]
     assert "forces in O, A, B, Q grow without bound towards O at 3.14159 rad" in motion.findings[-1].text
+    # The largest sample of these forces is not their maximum. That of the torque is one.
+    figures = load_figures(pf.motion_dataset(motion))
+    assert [(one["force_max"], one["force_unbounded"]) for one in figures["joints"].values()] == 4 * [(None, True)]
+    assert figures["drives"]["O"]["torque_max"] == pytest.approx(2.0 * 9.81 * 0.1, rel=1e-2)
+    assert joint_line({"": figures}) == "largest joint force: unbounded in O, A, B, Q"
+    assert load_tiles({"": figures})[-1] == ("largest joint force", "unbounded", "O, A, B, Q")
+
+
+def test_torques_between_samples_are_examined():
+    motion = pf.torques(pf.load("four_bar"), "O", speed=10.0, samples=5)
+    (found,) = motion.findings
+    assert (found.code, found.place) == ("samples-coarse", "samples")
+    fine = pf.motion_dataset(pf.torques(pf.load("four_bar"), "O", speed=10.0, samples=3601))
+    torques = [float(np.max(np.abs(data["drive_torque"]))) for data in (pf.motion_dataset(motion), fine)]
+    said = re.search(r"torque of \S+ is up to (\S+) N m in them and (\S+) N m", found.text)
+    assert said is not None
+    assert [float(each) for each in said.groups()] == pytest.approx(torques, rel=1e-3)
+    enough = int(found.remedy.split()[-1])
+    assert pf.torques(pf.load("four_bar"), "O", speed=10.0, samples=enough).findings == ()
+    # Along a path motors give the torques. Forces that grow without bound are left out, others at change points not.
+    along = pf.torques(pf.load("five_bar"), mode="++", samples=9)
+    assert [one.code for one in along.findings] == ["samples-coarse"]
+    assert "the torque of motor left is up to" in along.findings[0].text
+    gravity = replace(HEAVY, gravity=(0.0, -9.81))
+    for samples in (7, 361):
+        past = pf.torques(gravity, "O", start=math.pi / 3, samples=samples)
+        assert [one.code for one in past.findings] == ["special-pose", "loads-unbounded"]
 
 
 def test_a_flywheel_takes_samples_at_change_points():
@@ -751,6 +780,9 @@ def test_the_commands_write_results_that_other_commands_take(rocker, tmp_path):
     assert done.returncode == 0, done.stderr
     assert "1 degree of freedom; O moves from 1.0472 rad to 7.3304 rad, a whole turn" in done.stdout
     assert "crunode" in done.stdout
+    assert "repeats" not in done.stdout
+    longer = paraflex("kinematics", rocker, "--drive", "O", "--to", "800 deg", "--samples", "9")
+    assert "The motion repeats after each turn of O: dead points, transmission angles and" in longer.stdout
     found = json.loads(pf.load_results(folder).attrs["kinematics"])
     assert len(found["assemblies"]) == 2
     assert found["drive"]["full_turn"]
@@ -872,3 +904,61 @@ def test_points_that_pause_with_the_whole_mechanism_have_no_cusp():
     """At the corners of a path all points stop; the followed one has corners there and no cusps."""
     motion = pf.kinematics(pf.load("five_bar"))
     assert motion.features.trails["distal1.C"].cusps == ()
+
+
+def geared(ratio):
+    """Return the crank-rocker, its crank O driven by a motor M through a gear."""
+    return replace(
+        four_bar(0.4, 0.1, 0.35, 0.25), gears=(pf.Gear("gear", "M", "O", ratio),),
+        ground={"O": (0.0, 0.0), "Q": (0.4, 0.0)},
+        bodies=(*four_bar(0.4, 0.1, 0.35, 0.25).bodies, pf.RigidBody("motor", points={"M": (0.0, 0.0)})),
+        joints=(*four_bar(0.4, 0.1, 0.35, 0.25).joints, revolute("M", "ground.O", "motor.M")),
+        assemblies=(pf.Assembly("open", {"crank": 0.7, "coupler": 0.3, "rocker": 1.0, "motor": 0.0}),),
+    )  # fmt: skip
+
+
+@pytest.mark.parametrize("turns", [2, 5])
+def test_a_cycle_of_two_turns_of_a_geared_drive_is_searched_once(turns):
+    """Angles of the crank are 0.7 plus half those of the motor: one turn shows half of the crank's positions."""
+    base, crank, coupler, rocker = 0.4, 0.1, 0.35, 0.25
+    found = pf.kinematics(geared(0.5), "M", end=2 * math.pi * turns, samples=5).features
+    far, near = (
+        math.acos((base**2 + arm**2 - rocker**2) / (2 * base * arm)) for arm in (coupler + crank, coupler - crank)
+    )
+    drives = sorted(2.0 * ((place - 0.7) % (2 * math.pi)) for place in (far, near + math.pi))
+    assert [one.drive for one in found.dead_points["Q"]] == pytest.approx(drives, abs=1e-11)
+    assert found.cycle == 2
+    ratio = (drives[1] - drives[0]) / (4 * math.pi - drives[1] + drives[0])
+    assert found.time_ratios["Q"] == pytest.approx(max(ratio, 1.0 / ratio), rel=1e-11)
+    # The gear drives the crank, at which there is no transmission angle.
+    (one,) = found.transmissions
+    least = math.acos((coupler**2 + rocker**2 - (base - crank) ** 2) / (2 * coupler * rocker))
+    assert (one.joint, one.smallest.value) == ("B", pytest.approx(least, abs=1e-12))
+    assert one.smallest.drive == pytest.approx(2.0 * (2 * math.pi - 0.7), abs=1e-5)
+
+
+def test_one_turn_of_a_geared_drive_is_no_cycle():
+    found = pf.kinematics(geared(0.5), "M").features
+    assert found.cycle is None
+    assert found.time_ratios == {}
+    assert pf.kinematics(four_bar(0.4, 0.1, 0.35, 0.25), "O", end=20.0).features.cycle == 1
+
+
+def test_all_cusps_and_crunodes_of_a_wheel_that_rolls_on_are_found():
+    """A point of the rim rests where it touches the rail; one beyond it makes a loop there."""
+    mechanism = pf.Mechanism(
+        "wheel", {"O": (0.0, 0.05)},
+        (pf.RigidBody("carriage", points={"S": (0.0, 0.0)}),
+         pf.RigidBody("wheel", points={"C": (0.0, 0.0), "R": (0.05, 0.0), "X": (0.08, 0.0)})),
+        (revolute("C", "carriage.S", "wheel.C"),
+         pf.PrismaticJoint("rail", pf.PointRef.parse("ground.O"), pf.PointRef.parse("carriage.S"), direction=0.0)),
+        gears=(pf.Gear("roll", "C", "rail", -0.05),), assemblies=(pf.Assembly("a", {"carriage": 0.0, "wheel": 0.0}),),
+    )  # fmt: skip
+    turns = 6
+    trails = pf.kinematics(mechanism, "C", start=0.0, end=-2 * math.pi * turns).features.trails
+    touches = [-math.pi / 2 - 2 * math.pi * k for k in range(turns)]
+    assert [one.drive for one in trails["wheel.R"].cusps] == pytest.approx(touches, abs=1e-9)
+    # Half a loop turns by u with r u = p sin(u); that about the first touch begins before the motion.
+    half = scipy.optimize.brentq(lambda u: 0.05 * u - 0.08 * math.sin(u), 0.5, 3.0)
+    nodes = [(0.05 * (math.pi / 2 + 2 * math.pi * k), 0.05 - 0.08 * math.cos(half)) for k in range(1, turns)]
+    assert np.array([one.position for one in trails["wheel.X"].crunodes]) == pytest.approx(np.array(nodes), abs=1e-12)

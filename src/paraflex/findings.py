@@ -95,7 +95,7 @@ _DOUBTFUL = {
     "duration-long": "The run goes on for very long after the path.",
     "samples-few": "There are too few samples to resolve the turns of a prescribed motion.",
     "loop-unstable": "Sampled controllers are unstable with the linear model of all states.",
-    "samples-coarse": "Stresses, joint forces or torques of drives are larger between the samples that a run keeps.",
+    "samples-coarse": "Stresses, joint forces or torques of drives are larger between the samples that are kept.",
     "path-idle": "A path moves only along a coordinate that is not a task of the end-effector.",
     "path-cut-short": "The run ends before the path does.",
     "law-cut-short": "The run ends before the pieces or the table of a prescribed motion do.",

@@ -9,7 +9,7 @@ import xarray as xr
 
 from paraflex.driven import flywheel, kinematics, torques
 from paraflex.errors import ActuationError, AssemblyError, InputError, UnreachablePathError, renamed
-from paraflex.figures.kinematics import kinematics_of, kinematics_tables
+from paraflex.figures.kinematics import cycle_note, kinematics_of, kinematics_tables
 from paraflex.files import Model, load_path
 from paraflex.files.fields import number_in
 from paraflex.formatting import number, quantity
@@ -141,6 +141,7 @@ def _print(out: PlainConsole, data: xr.Dataset) -> None:
         if None not in drive["reach"]:
             low, high = (quantity(value, unit, digits=7) for value in drive["reach"])
             out.print_lines(f"limits of reach of {drive['joint']}: {low} and {high}; the range ends beside them")
+    out.print_lines(cycle_note(found))
     print_tables(out, kinematics_tables(data))
     if np.isfinite(data["kinetic_energy"].values).any():
         loads = load_figures(data)

@@ -32,6 +32,8 @@ _SAME_BRANCH = 0.05
 _DEPENDENT = 1e-9
 # Part of the width about a change point to which its place is shown.
 _SHARP = 1e-6
+# Difference of poses, and of velocities as a part of the largest, after which a motion repeats.
+_REPEATED, _SAME_RATES = 1e-9, 1e-6
 # Change points that a motion may pass, and those that a finding lists.
 _MOST_PASSED, _SHOWN = 100, 6
 Target = Callable[[Array], Array]
@@ -121,7 +123,7 @@ class Drive:
 
     @property
     def full_turn(self) -> bool:
-        """Whether the joint makes a whole turn, after which the motion repeats."""
+        """Whether the joint makes one whole turn, and others that move whole turns."""
         turns = [(last - first) / (2.0 * math.pi) for first, last in self.ends_of_others.values()]
         return math.isclose(self.turns, 1.0, rel_tol=1e-9) and all(abs(one - round(one)) < 1e-9 for one in turns)
 
@@ -281,6 +283,24 @@ class ExactMotion(Brief):
         """Degrees of freedom without the drives, and redundant constraints, at the first sample."""
         mechanism = replace(self.loops.system.mechanism, prescribed=())
         return mobility(build_system(mechanism), State(0.0, self.solution.q[0], self.solution.v[0]))
+
+    def repeats_at(self, k: int) -> bool:
+        """Return whether a drive has made whole turns at a sample, after which all bodies are as at the first one."""
+        drive, system, q, v = self.drive, self.system, self.solution.q, self.solution.v
+        if drive is None or drive.unit != "rad":
+            return False
+        off, angles = q[k] - q[0], [system.body(body.name).angle for body in system.mechanism.bodies]
+        off[angles] -= 2.0 * math.pi * np.round(off[angles] / (2.0 * math.pi))
+        pace = np.max(np.abs(v[0] / system.units))
+        turns = abs(drive.at(self.solution.t[k]) - drive.start) / (2.0 * math.pi)
+        whole = turns > 0.5 and abs(turns - round(turns)) < _REPEATED
+        near = bool(np.all(np.abs(off) <= _REPEATED * system.units))
+        return whole and near and bool(np.all(np.abs(v[k] - v[0]) <= _SAME_RATES * pace * system.units))
+
+    @cached_property
+    def repeats(self) -> bool:
+        """Whether the motion starts again at its end."""
+        return self.repeats_at(self.solution.t.size - 1)
 
     def at(self, t: float) -> ExactState:
         """Return the motion (1, n) at a time within the samples [s], exact to rounding."""

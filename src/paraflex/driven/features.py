@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 import scipy
 
-from paraflex.arrays import Array, Brief, Mask
+from paraflex.arrays import Array, Brief, Indices
 from paraflex.dynamics import axis_angle, joint_coordinate
 from paraflex.dynamics.joint_coordinates import unit_vectors
 from paraflex.dynamics.points import PointMotion, cross, marker_position, point_motion
@@ -28,9 +28,11 @@ _SHARP = 4.0 * np.finfo(float).eps
 _LOCATED = 1e-9
 # Speed at a cusp, as a part of the largest speed of the point; smallest angle at which two branches cross [rad].
 _STILL, _CROSSING = 1e-8, 1e-3
+# Segments of paths of which the crossings with all others are found at a time, for memory.
+_AT_A_TIME = 256
 # Distance of a path after a rest from that before it, as a part of the way, below which it is the same path.
 _SAME_PATH = 1e-4
-# A curve with more crossings retraces itself.
+# A curve with more crossings in a turn of the drive retraces itself.
 _MOST_CROSSINGS = 50
 
 
@@ -108,9 +110,12 @@ class KinematicFeatures(Brief):
     dead_points : mapping of str to tuple of Extreme
         Positions at which a joint reverses, by joint, in order of time: the value is that of the joint [rad, m].
     time_ratios : mapping of str to float
-        Ratio of the times of the slower and the faster stroke, for joints with two dead points in a turn of the drive.
+        Ratio of the times of the slower and the faster stroke, for joints with two dead points in a cycle.
     trails : mapping of str to Trail
         Paths of coupler points by name.
+    cycle : int, optional
+        Turns of the drive after which the motion repeats: the properties are those of the first cycle. None for a
+        motion that does not repeat; the properties are those of the whole motion.
     """
 
     freedoms: int
@@ -118,6 +123,7 @@ class KinematicFeatures(Brief):
     dead_points: Mapping[str, tuple[Extreme, ...]]
     time_ratios: Mapping[str, float]
     trails: Mapping[str, Trail]
+    cycle: int | None = None
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain numbers, in SI units and radians."""
@@ -127,19 +133,29 @@ class KinematicFeatures(Brief):
 
 def features_of(motion: ExactMotion) -> KinematicFeatures:
     """Compute the properties of a driven motion; see `KinematicFeatures`."""
-    followers = [one.name for one in motion.system.mechanism.joints if one.moves and one.name not in _driven(motion)]
+    mechanism = motion.system.mechanism
+    prescribed = {one.joint for one in mechanism.prescribed}
+    followers = [one.name for one in mechanism.joints if one.moves and one.name not in prescribed]
     dead = {name: ends for name in followers if (ends := tuple(_dead_points(motion, name)))}
     ratios = {}
-    if motion.drive is not None and motion.drive.full_turn:
+    if motion.drive is not None and motion.repeats:
         strokes = {name: abs(ends[1].time - ends[0].time) for name, ends in dead.items() if len(ends) == 2}
         whole = motion.drive.duration
         ratios = {name: max(t, whole - t) / min(t, whole - t) for name, t in strokes.items()}
     trails = {str(ref): _trail(motion, ref) for ref in _coupler_points(motion)}
-    return KinematicFeatures(motion.mobility.freedoms, tuple(_transmissions(motion)), dead, ratios, trails)
+    cycle = round(motion.drive.turns) if motion.drive is not None and motion.repeats else None
+    return KinematicFeatures(motion.mobility.freedoms, tuple(_transmissions(motion)), dead, ratios, trails, cycle)
 
 
 def _driven(motion: ExactMotion) -> set[str]:
-    return {one.joint for one in motion.system.mechanism.prescribed}
+    """Return the joints that drives move, themselves or through gears and other relations."""
+    mechanism = motion.system.mechanism
+    found = {one.joint for one in mechanism.prescribed}
+    if motion.rigid is not None:
+        found |= {motor.joint for motor in mechanism.motors}
+    for _ in mechanism.relations:
+        found |= {one for each in mechanism.relations if len(left := {*each.joints} - found) == 1 for one in left}
+    return found
 
 
 def _drive_at(motion: ExactMotion, t: float) -> float | None:
@@ -170,10 +186,6 @@ def _sign_changes(
         yield float(t[0])
 
 
-def _repeats(motion: ExactMotion) -> bool:
-    return motion.drive is not None and motion.drive.full_turn
-
-
 def _dead_points(motion: ExactMotion, name: str) -> Iterator[Extreme]:
     """Yield the positions at which a joint reverses."""
     solution, system = motion.solution, motion.system
@@ -186,7 +198,7 @@ def _dead_points(motion: ExactMotion, name: str) -> Iterator[Extreme]:
         there = motion.at(t)
         return float(joint_coordinate(system, name, there.q, there.v).rate[0])
 
-    for t in sorted(_sign_changes(solution.t, rates, _ZERO * largest, rate, repeats=_repeats(motion))):
+    for t in sorted(_sign_changes(solution.t, rates, _ZERO * largest, rate, repeats=motion.repeats)):
         yield _at(motion, float(joint_coordinate(system, name, motion.at(t).q).value[0]), t)
 
 
@@ -221,8 +233,6 @@ def _couplers(motion: ExactMotion) -> Iterator[tuple[str, str, PointRef, PointRe
 def _transmissions(motion: ExactMotion) -> Iterator[Transmission]:
     """Yield the transmission angles of couplers at bodies that are guided by the ground and not driven."""
     guides, driven, t = _guides(motion), _driven(motion), motion.solution.t
-    if motion.rigid is not None:
-        driven |= {motor.joint for motor in motion.system.mechanism.motors}
     for coupler, joint, far, near in _couplers(motion):
         guide = guides.get(far.body)
         if far.on_ground or guide is None or guide.name in driven or near.body == GROUND:
@@ -302,7 +312,7 @@ def _trail(motion: ExactMotion, ref: PointRef) -> Trail:
 
     gains = np.sum(path.velocity * path.acceleration, axis=1)
     zero = _ZERO * fastest * float(np.max(np.linalg.norm(path.acceleration, axis=1)))
-    slowest = _sign_changes(solution.t, gains, zero, gain, repeats=_repeats(motion))
+    slowest = _sign_changes(solution.t, gains, zero, gain, repeats=motion.repeats)
     cusps = []
     for t in sorted(slowest):
         here = there(t)
@@ -340,8 +350,8 @@ def _crossings(
 ) -> Sequence[tuple[float, float]]:
     """Return the pairs of times at which a path (k, 2) crosses itself; none if it retraces itself."""
     t, found = motion.solution.t, []
-    pairs = np.argwhere(_crossed(path))
-    if len(pairs) > _MOST_CROSSINGS:
+    pairs = _crossed(path)
+    if len(pairs) > _MOST_CROSSINGS * (1.0 if motion.drive is None else max(motion.drive.turns, 1.0)):
         return []
     for i, j in pairs:
         times = np.array([t[i] + t[i + 1], t[j] + t[j + 1]]) / 2.0
@@ -361,12 +371,16 @@ def _crossings(
     return found
 
 
-def _crossed(path: Array) -> Mask:
-    """Return which pairs (k - 1, k - 1) of segments of a polyline cross, the earlier one first, neighbours excluded."""
-    a, b = path[:-1], path[1:]
-    side = cross((b - a)[:, None], path[None] - a[:, None])
-    apart = side[:, :-1] * side[:, 1:] < 0.0
-    crossed = np.triu(apart & apart.T, 2)
+def _crossed(path: Array) -> Indices:
+    """Return the pairs (pairs, 2) of segments of a polyline that cross, the earlier one first, neighbours excluded."""
+    a, b, found = path[:-1], path[1:], []
+    for first in range(0, len(a), _AT_A_TIME):
+        p, q = a[first : first + _AT_A_TIME, None], b[first : first + _AT_A_TIME, None]
+        side = cross(q - p, path[first:] - p)
+        apart = side[:, :-1] * side[:, 1:] < 0.0
+        apart &= cross((b - a)[first:], p - a[first:]) * cross((b - a)[first:], q - a[first:]) < 0.0
+        found.append(np.argwhere(np.triu(apart, 2)) + first)
+    pairs = np.concatenate(found)
     if np.allclose(path[0], path[-1], rtol=0.0, atol=1e-9 * float(np.max(np.ptp(path, axis=0)))):
-        crossed[0, -1] = False
-    return crossed
+        return pairs[(pairs[:, 0] > 0) | (pairs[:, 1] < len(a) - 1)]
+    return pairs

@@ -73,14 +73,15 @@ def load_errors(system: System, multipliers: Array, share: float) -> Array:
     return share * np.nanmax(np.abs(multipliers * system.row_units), initial=0.0) / system.row_units
 
 
-def with_limits(motion: ExactMotion, solution: Solution) -> tuple[Solution, list[Finding]]:
-    """Return a solution with loads that has their limits at change points, and findings on loads without a limit.
+def with_limits(motion: ExactMotion, solution: Solution) -> tuple[Solution, Mask, list[Finding]]:
+    """Return a solution with loads that has their limits at change points; rows (m,) without, and findings on them.
 
     Where assemblies meet, the mechanism can move with its drives held. Forces have a limit if those that the motion
     requires do no work on this free motion; otherwise they grow without bound in the rows that take part in it. The
     limit is that of the cubic polynomial through forces on both sides or, near the end of a motion, on one.
     """
     system, drive, multipliers = motion.system, motion.drive, solution.multipliers.copy()
+    grows = np.zeros(system.m, dtype=bool)
     last, without = float(solution.t[-1]), dict[tuple[str, ...], list[float]]()
     width = _BEYOND * width_beside(drive, last, system.mechanism)
     for passed in motion.passed:
@@ -92,6 +93,7 @@ def with_limits(motion: ExactMotion, solution: Solution) -> tuple[Solution, list
         q, v, a = (np.concatenate(each) for each in zip(*map(motion.at, t.tolist()), strict=True))
         about, idle = replace(solution, t=t, q=q, v=v, a=a), np.zeros((t.size, len(system.mechanism.motors)))
         unbounded = _unbounded(system, next(_balances(system, about, idle)))
+        grows |= unbounded
         names = tuple(dict.fromkeys(joint_of_row(system.rows[row]) for row in np.flatnonzero(unbounded)))
         without.setdefault(names, []).append(passed)
         at = np.flatnonzero(np.abs(solution.t - passed) <= AT * width)
@@ -100,7 +102,7 @@ def with_limits(motion: ExactMotion, solution: Solution) -> tuple[Solution, list
             limits = scipy.interpolate.BarycentricInterpolator(t[1:], beside)(solution.t[at])
             multipliers[at] = np.where(unbounded, multipliers[at], limits)
     found = [_growing(motion, names, times) for names, times in without.items() if names]
-    return replace(solution, multipliers=multipliers), found
+    return replace(solution, multipliers=multipliers), grows, found
 
 
 def _unbounded(system: System, balance: _Balance) -> Mask:

@@ -2,7 +2,7 @@
 
 import math
 import time
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, ClassVar
@@ -11,13 +11,15 @@ import numpy as np
 
 from paraflex.actuation import allocate, required_effort
 from paraflex.arguments import checked_arguments, named_in_errors
-from paraflex.arrays import Array
+from paraflex.arrays import Array, Mask
 from paraflex.dynamics import System, build_system, reference_pose, still_signals
 from paraflex.dynamics.joint_coordinates import joint_value, value_text
 from paraflex.dynamics.load_values import check_laws
-from paraflex.errors import AssemblyError, InputError, UnreachablePathError
+from paraflex.errors import AssemblyError, InputError, ParaflexError, UnreachablePathError
 from paraflex.findings import Finding
 from paraflex.integrators import Solution, check_times
+from paraflex.integrators.between import samples_too_few, with_between
+from paraflex.integrators.solution import LateFindings
 from paraflex.kernel.constraints import constraint_values
 from paraflex.kernel.packed import make_scratch
 from paraflex.limits import solvable
@@ -34,8 +36,10 @@ from .features import KinematicFeatures, features_of
 from .loads import LIMITS_RIGHT_TO, RIGHT_TO, load_errors, with_limits, with_loads
 from .ranges import Wish, check_determined, chosen_drive, driven_loops, followed, freedoms_at, ranged
 
-# Samples between which properties are located: of a drive, and at most for other motions.
+# Samples between which properties are located: of a travel or a turn of a drive, and at most for other motions.
 _FINE, _FINEST = 361, 1441
+# Part of a turn by which a whole number of turns may be missed.
+_WHOLE = 1e-9
 
 
 @named_in_errors("a driven motion", "the motion that kinematics returns")
@@ -60,7 +64,7 @@ class DrivenMotion(MotionRun):
         Name of the path and of the actuation mode; empty for none.
     passed : tuple of float
         Times of change points that the motion passes [s].
-    notes : tuple of Finding
+    notes : sequence of Finding
         Findings on the assembly, change points, and forces.
     """
 
@@ -71,7 +75,7 @@ class DrivenMotion(MotionRun):
     path: str = ""
     mode: str = ""
     passed: tuple[float, ...] = ()
-    notes: tuple[Finding, ...] = ()
+    notes: Sequence[Finding] = ()
     open_loop: ClassVar[bool] = False
 
     @property
@@ -87,29 +91,42 @@ class DrivenMotion(MotionRun):
     @cached_property
     def findings(self) -> tuple[Finding, ...]:
         """Findings on the assembly, change points, and forces; the motion itself is exact."""
-        return self.notes
+        return tuple(self.notes)
 
     @cached_property
     def exact(self) -> ExactMotion:
-        """The motion at any time, exact to rounding: over one turn of the drive, with samples of its own."""
+        """The motion at any time, exact to rounding, with samples of its own, until it repeats."""
         drive, solution = self.drive, self.solution
-        one_turn = drive is not None and drive.alone
-        if one_turn and drive is not None and drive.turns > 1.0:
-            drive = replace(drive, end=drive.start + math.copysign(2.0 * math.pi, drive.end - drive.start))
         end = float(solution.t[-1]) if drive is None else drive.duration
-        times = np.linspace(0.0, end, _FINE if one_turn else int(np.clip(solution.t.size, _FINE, _FINEST)))
+        one = drive is not None and drive.alone
+        times = np.linspace(0.0, end, _FINE if one else int(np.clip(solution.t.size, _FINE, _FINEST)))
+        if drive is not None and drive.turns > 1.0 + _WHOLE:
+            # Whole turns are samples.
+            pieces = np.arange(math.ceil((_FINE - 1) * (drive.turns - _WHOLE)))
+            times = np.append(pieces * 2.0 * math.pi / ((_FINE - 1) * drive.speed), end)
         passed, rigid = self.passed, self.rigid
         if times.size != solution.t.size or times[-1] != solution.t[-1]:
-            if rigid is None:
-                (t, q, v, a), passed = followed(
-                    self.loops, times, FirstPose(solution.q[0], (solution.v[0], solution.a[0])), drive
-                )
-            else:
-                assert isinstance(self.loops, PathClosure)
-                rigid = PathFollower(self.loops, solution.q[0], rigid.path)(times)
-                t, q, v, a = rigid.t, rigid.q, rigid.v, rigid.a
-            solution = replace(solution, t=t, q=q, v=v, a=a)
-        return ExactMotion(self.system, solution, drive, self.loops, rigid, passed)
+            solution, rigid, passed = self.moved(times)
+        exact = ExactMotion(self.system, solution, drive, self.loops, rigid, passed)
+        for k in range(_FINE - 1, times.size - 1, _FINE - 1):
+            if drive is not None and exact.repeats_at(k):
+                solution = replace(solution, **{name: getattr(solution, name)[: k + 1] for name in "tqva"})
+                drive = replace(drive, end=drive.at(times[k]))
+                passed = tuple(t for t in passed if t <= times[k])
+                return replace(exact, solution=solution, drive=drive, passed=passed)
+        return exact
+
+    def moved(self, times: Array) -> tuple[Solution, RigidMotion | None, tuple[float, ...]]:
+        """Return the motion at other times up to its end, without loads, along a path if any, and change points."""
+        solution, rigid, passed = self.solution, self.rigid, ()
+        if rigid is None:
+            first = FirstPose(solution.q[0], (solution.v[0], solution.a[0]))
+            (t, q, v, a), passed = followed(self.loops, times, first, self.drive)
+        else:
+            assert isinstance(self.loops, PathClosure)
+            rigid = PathFollower(self.loops, solution.q[0], rigid.path)(times)
+            t, q, v, a = rigid.t, rigid.q, rigid.v, rigid.a
+        return replace(solution, t=t, q=q, v=v, a=a), rigid, passed
 
     @cached_property
     def features(self) -> KinematicFeatures:
@@ -333,7 +350,7 @@ def torques(
         assembly=assembly,
     )  # fmt: skip
     check_laws(motion.system, motion.solution.t, motion.solution.q, motion.solution.v)
-    effort, name = np.zeros_like(motion.effort), ""
+    effort, name, acting = np.zeros_like(motion.effort), "", None
     if motion.rigid is not None:
         known_modes = (*getattr(getattr(mechanism, "study", None), "modes", ()), *source.modes)
         chosen = mode or next(iter(known_modes), None)
@@ -344,15 +361,45 @@ def torques(
     elif mode is not None:
         remedy = "leave it out, or follow a path"
         raise InputError("has no effect without a path", field="mode", value=mode, remedy=remedy)
-    solution = with_loads(motion.system, motion.solution, effort)
-    notes = [*motion.notes, *shared_loads(motion.system, solution)]
-    if motion.passed:
-        exact = ExactMotion(motion.system, motion.solution, motion.drive, motion.loops, passed=motion.passed)
-        solution, unbounded = with_limits(exact, solution)
-        notes += unbounded
+    solution, grows, unbounded = _loaded(motion, effort)
+    notes = [*motion.notes, *shared_loads(motion.system, solution), *unbounded]
     errors = load_errors(motion.system, solution.multipliers, LIMITS_RIGHT_TO if motion.passed else RIGHT_TO)
+    errors[grows] = math.inf
     solution = replace(solution, multiplier_errors=errors)
-    return replace(motion, solution=solution, effort=effort, mode=name, notes=tuple(notes))
+    late = LateFindings(lambda: (*notes, *_samples_too_few(motion, acting)))
+    return replace(motion, solution=solution, effort=effort, mode=name, notes=late)
+
+
+def _loaded(motion: DrivenMotion, effort: Array) -> tuple[Solution, Mask, list[Finding]]:
+    """Return the solution with loads, the rows (m,) of those that grow without bound, and findings on them."""
+    system, solution = motion.system, with_loads(motion.system, motion.solution, effort)
+    if not motion.passed:
+        return solution, np.zeros(system.m, dtype=bool), []
+    return with_limits(ExactMotion(system, motion.solution, motion.drive, motion.loops, passed=motion.passed), solution)
+
+
+def _samples_too_few(motion: DrivenMotion, acting: ActuationMode | None) -> Iterator[Finding]:
+    """Yield a finding on loads that are larger between the samples; those that grow without bound are left out."""
+    system, motors = motion.system, motion.system.mechanism.motors
+    finer = with_between(motion.solution.t, system.n)
+    if finer is None:
+        return
+    try:
+        whole, rigid, passed = motion.moved(finer.times)
+        check_laws(system, whole.t, whole.q, whole.v)
+        effort = np.zeros((whole.t.size, len(motors)))
+        if rigid is not None and acting is not None:
+            effort = allocate(required_effort(rigid), acting)
+    except ParaflexError:
+        return
+    whole, grows, _ = _loaded(replace(motion, solution=whole, passed=passed), effort)
+    whole.multipliers[:, grows] = np.nan
+    slides = [system.mechanism.slides(motor.joint) for motor in motors]
+    more = [(f"the {'force' if slide else 'torque'} of motor {motor.name}", "N" if slide else "N m", np.abs(each))
+            for motor, slide, each in zip(motors, slides, effort.T, strict=True)]  # fmt: skip
+    found = samples_too_few(system, whole, motion.solution, motion.solution.t.size, more)
+    if found is not None:
+        yield replace(found, place="samples")
 
 
 def _solution(system: System, arrays: tuple[Array, ...], began: float) -> Solution:

@@ -1,6 +1,7 @@
 """Tables of driven motions: ranges, dead points and time ratios of joints, transmission angles, coupler curves."""
 
 import json
+import math
 from collections.abc import Container, Iterator, Mapping
 from typing import Any
 
@@ -76,6 +77,18 @@ def kinematics_tiles(data: xr.Dataset) -> list[tuple[str, str, str]]:
     return tiles
 
 
+def cycle_note(found: Found) -> str:
+    """Return a sentence on a motion that repeats before its end, whose properties are those of one cycle, or ""."""
+    drive, cycle = found["drive"], found.get("cycle")
+    if cycle is None or abs(drive["end"] - drive["start"]) < 2.0 * math.pi * (cycle + 0.5):
+        return ""
+    turns = "each turn" if cycle == 1 else f"{cycle} turns"
+    return (
+        f"The motion repeats after {turns} of {drive['joint']}: dead points, transmission angles and special points "
+        "are listed once."
+    )
+
+
 def _place(found: Found) -> tuple[str, tuple[str, str]]:
     """Return entry, and heading and unit of positions in tables: of the drive, or times without constant speed."""
     drive = found["drive"]
@@ -109,7 +122,7 @@ def _dead_points(found: Found) -> Table:
         (joint, *(each["value"] if found["joint_units"][joint] == unit else None for unit in ("rad", "m")), each[key])
         for joint, ends in found["dead_points"].items() if len(ends) > 2 for each in ends
     ]  # fmt: skip
-    return table_of("Dead points", [("joint", ""), ("angle", "rad"), ("travel", "m"), at], rows)
+    return table_of("Dead points", [("joint", ""), ("angle", "rad"), ("travel", "m"), at], rows, cycle_note(found))
 
 
 def _transmissions(found: Found) -> Table:
@@ -118,7 +131,7 @@ def _transmissions(found: Found) -> Table:
     rows = [(one["joint"], one["coupler"], *(one[end][name] for end, name in ends))
             for one in found["transmission_angles"]]  # fmt: skip
     heads = [("joint", ""), ("coupler", ""), ("smallest", "rad"), at, ("largest", "rad"), at]
-    return table_of("Transmission angles", heads, rows)
+    return table_of("Transmission angles", heads, rows, cycle_note(found))
 
 
 def _points(data: xr.Dataset) -> Table:
@@ -152,7 +165,7 @@ def _special(found: Found) -> Table:
         for point, trail in found["trails"].items() for kind in ("cusp", "crunode") for each in trail[f"{kind}s"]
     ]  # fmt: skip
     heads = [("point", ""), ("kind", ""), ("x", "m"), ("y", "m"), at, ("and at", at[1])]
-    return table_of("Special points of coupler curves", heads, rows, alike=("x", "y"))
+    return table_of("Special points of coupler curves", heads, rows, cycle_note(found), alike=("x", "y"))
 
 
 def _assemblies(found: Found) -> Table:

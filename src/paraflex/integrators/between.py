@@ -5,7 +5,7 @@ loads are computed again; the requested samples are kept.
 """
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import replace
 from functools import partial
 from typing import NamedTuple
@@ -100,7 +100,9 @@ def _fast_pieces(limits: StepLimits, spacing: float, times: Array) -> Iterator[A
             yield np.linspace(first, last, math.ceil((last - first) / step) + 1)
 
 
-def samples_too_few(system: System, whole: Solution, kept: Solution, samples: int) -> Finding | None:
+def samples_too_few(
+    system: System, whole: Solution, kept: Solution, samples: int, more: Iterable[tuple[str, str, Array]] = ()
+) -> Finding | None:
     """Return a finding on loads that are larger between the samples that a run keeps, or None if there are none.
 
     Parameters
@@ -111,6 +113,8 @@ def samples_too_few(system: System, whole: Solution, kept: Solution, samples: in
         Solution with the additional samples and without them.
     samples : int
         Number of samples requested for the run.
+    more : iterable of (str, str, (k,) array)
+        Name, unit and magnitudes of further loads.
     """
     if whole.t.size == kept.t.size:
         return None
@@ -119,7 +123,7 @@ def samples_too_few(system: System, whole: Solution, kept: Solution, samples: in
     found, times_as_many = [], 1.0
     # Values of a failed run may overflow.
     with np.errstate(all="ignore"):
-        for name, unit, loads in _largest_loads(system, whole):
+        for name, unit, loads in (*_largest_loads(system, whole), *more):
             most, most_kept = float(np.max(loads)), float(np.max(loads[np.isin(whole.t, kept.t)]))
             if most > max((1.0 + LARGER) * most_kept, least[unit]):
                 when = whole.t[np.argmax(loads)]

@@ -10,7 +10,7 @@ from paraflex.figures.loads import effort_table, joint_tables, stress_table
 from paraflex.figures.selection import names_of
 from paraflex.formatting import number, quantity, speed_text, text_symbol
 from paraflex.results.controllers import controller_figures
-from paraflex.results.loads import load_figures, load_text, ranked
+from paraflex.results.loads import load_figures, load_text, ranked, unbounded_joints
 from paraflex.units import EFFORTS
 from .text import by_run, sections, table_html
 
@@ -86,7 +86,9 @@ def load_tiles(figures: Mapping[str, Mapping[str, Any]]) -> list[tuple[str, str,
             of += f"; up to {speed_text(one['speed_max'], one['speed_unit'] or '', 3)}, {power}"
         tiles.append((f"largest drive {kind}", load_text(one, "torque", unit, 3), of))
     forces = ranked(figures, "joints", "force_max")
-    if forces and forces[0][0]:
+    if unbounded := unbounded_joints(figures):
+        tiles.append(("largest joint force", "unbounded", text_symbol(unbounded)))
+    elif forces and forces[0][0]:
         _, run, joint, one = forces[0]
         where = f"{_of(run, joint)}, t = {number(one['force_time'])} s"
         tiles.append(("largest joint force", load_text(one, "force", "N", 3), where))

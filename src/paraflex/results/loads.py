@@ -21,7 +21,8 @@ _NAMES = {"stress_place": "place", "stress_time": "time", "stress_max_error": "s
 def load_figures(run: xr.Dataset) -> dict[str, Any]:
     """Return the largest magnitudes of loads of one run.
 
-    Values that a model does not give are None, and groups that the results do not hold are missing. A run that failed
+    Values that a model does not give are None, and so are those of loads that grow without bound, for which
+    `force_unbounded`, ... are True. Groups that the results do not hold are missing. A run that failed
     has no loads, as its largest ones may be artefacts of the failure.
 
     Returns
@@ -61,6 +62,9 @@ def load_figures(run: xr.Dataset) -> dict[str, Any]:
         if torque in run and f"{dim}_energy" in run:
             named = (("torque", torque), ("speed", f"{dim}_speed"), ("power", f"{dim}_power"))
             parts = [_most(name, run, variable, dim) for name, variable in named]
+            for effort, power in zip(parts[0], parts[2], strict=True):
+                if "torque_unbounded" in effort:
+                    power |= {"power_max": None, "power_time": None}
             out[group] = {
                 str(name): {"torque_unit": unit, "speed_unit": None if unit is None else RATES[unit]}
                 | most | speed | power | {"energy": finite_or_none(energy)}
@@ -96,6 +100,9 @@ def _most(name: str, run: xr.Dataset, variable: str, dim: str = "") -> list[Figu
         if times is not None and most is not None:
             when = float(times[np.nanargmax(np.where(np.isfinite(each), each, np.nan))])
         more = {} if error is None else {f"{name}_error": finite_or_none(error)}
+        if error is not None and np.isinf(error):
+            most = when = None
+            more[f"{name}_unbounded"] = True
         out.append({f"{name}_max": most, f"{name}_time": when, **more})
     return out
 
@@ -149,8 +156,17 @@ def ranked(loads: Mapping[str, Mapping[str, Any]], group: str, key: str) -> Rank
     return sorted(known, key=lambda each: -each[0])
 
 
+def unbounded_joints(loads: Mapping[str, Mapping[str, Any]]) -> str:
+    """Return the joints of all runs whose forces grow without bound, as text."""
+    names = [joint for one in loads.values() for joint, each in one.get("joints", {}).items()
+             if each.get("force_unbounded")]  # fmt: skip
+    return ", ".join(dict.fromkeys(names))
+
+
 def joint_line(loads: Mapping[str, Mapping[str, Any]]) -> str:
     """Return a sentence on the largest joint force of all runs, empty if there is none."""
+    if unbounded := unbounded_joints(loads):
+        return f"largest joint force: unbounded in {unbounded}"
     known = ranked(loads, "joints", "force_max")
     if not known or not known[0][0]:
         return ""
