@@ -203,7 +203,7 @@ def test_buckling_factors_take_the_turn_of_links_with_them():
 
 @pytest.mark.parametrize(("load", "buckles"), [(6.0, True), (40.0, False)])
 def test_estimates_with_a_stiffening_law_are_those_of_its_tangent(load, buckles):
-    """A rigid arm on a spring of torque -20 (x - 0.3) - 30 x^3 is turned by a force across, from above its axis to below.
+    """A rigid arm on a spring of torque -20 (x - 0.3) - 30 x^3 is turned by a force across.
 
     The stiffness 20 + 90 x^2 - F l sin x first decreases and then increases, so that nothing buckles.
     """
