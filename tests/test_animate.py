@@ -437,6 +437,7 @@ def test_the_command_makes_a_film_and_writes_over_none(folder, tmp_path):
         (["--mode", "+++"], "--mode: no such mode in these results (got '+++')"),
         (["--theme", "drak"], "--theme: unknown theme (got 'drak'); did you mean \"dark\"?"),
         (["--magnify", "-2"], "--magnify: must not be negative"),
+        (["--magnify", "nan"], "--magnify: not a finite number (got nan)"),
         (["--point", "link1.Z"], "--point: no such point in these results (got 'link1.Z'); one of "),
     ],
 )

@@ -144,7 +144,7 @@ FIELDS = [
     ('length = "reach"', "length = 0.0", "body.left.length: must be positive (got 0.0)", "in m"),
     ('length = "reach"', "length = -1.0", "body.left.length: must be positive (got -1.0)", "in m"),
     ("area = 1e-4", "area = -1e-4", "body.left_arm.section.area: must be positive (got -0.0001)", "in m^2"),
-    ("youngs_modulus = 210e9", "youngs_modulus = 0", "body.left.material.youngs_modulus: must be positive", "in Pa"),
+    ("youngs_modulus = 210e9", "youngs_modulus = 0", "material.steel.youngs_modulus: must be positive", "in Pa"),
     ("mass = 0.1\n", "mass = -0.1\n", "body.left.lumps.B.mass: must not be negative (got -0.1)", "in kg"),
     ("stiffness = 2.0", "stiffness = -2.0", "spring.coil.stiffness: must not be negative (got -2.0)", "in N m/rad"),
     ("coefficient = 0.1", "coefficient = 0", "damper.oil.coefficient: must be positive (got 0.0)", "in N m s/rad"),

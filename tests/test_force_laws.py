@@ -317,6 +317,9 @@ def test_rigid_torques_name_a_law_that_is_not_finite():
     model = read(PRESS.replace('"-k * max(0, guide.travel - 20 mm) - 30 N s/m * guide.rate"', law))
     with pytest.raises(InputError, match=r"load.press.force: not a finite number at t = 0\.\d+ s"):
         pf.torques(model, "guide", start=0.0, end=0.02, speed=0.1)
+    spring = f'[spring.coil]\njoint = "guide"\ntorque = {law.replace("log", "1 N * log")}\n[study]'
+    with pytest.raises(InputError, match=r"spring.coil.torque: not a finite number at t = 0\.\d+ s"):
+        pf.torques(read(PRESS.replace("[study]", spring)), "guide", start=0.0, end=0.02, speed=0.1)
 
 
 def test_files_hold_laws_of_springs(tmp_path):
@@ -361,6 +364,12 @@ def test_files_hold_laws(tmp_path):
         ("'ram.T-1.vy' * 3", "guide.travel * q", 'unknown parameter "q"'),
         ("'ram.T-1.vy' * 3", "5 mm * guide.travel", "a quantity in m^2 where one in N is asked for"),
         ('over = "1000 * guide.travel"', 'over = "2 * t"', "load.stroke.over: contains no joint and no point"),
+        ('over = "1000 * guide.travel"', 'over = "guide.angle"', "load.stroke.over: a prismatic joint has a travel"),
+        (
+            '"1000 * guide.travel"',
+            '"guide"',
+            "unknown parameter \"guide\" (got 'guide'); choose from k; of a joint write guide.angle or guide.travel",
+        ),
         ("table = [[0, 0], [10, 2], [20, 5]]", "torque = 3", "load.stroke.over: is for tables only"),
         ("[10, 2], [20, 5]", "[20, 2], [10, 5]", "its values of 1000 * guide.travel must ascend, but row 3 does not"),
         (

@@ -870,7 +870,10 @@ def test_paths_of_points_mark_cusps_and_crunodes(rocker):
         ),
         (["kinematics", "FILE", "--drive", "O", "--from", "abc"], "--from: not a number"),
         (["kinematics", "five_bar", "--drive", "A1", "--drive", "A2=60 rpm"], 'has two, "A2=FIRST:LAST"'),
-        (["kinematics", "five_bar", "--drive", "A1", "--drive", "A1=3"], "--drive: one joint both moves and is held"),
+        (
+            ["kinematics", "five_bar", "--drive", "A1", "--drive", "A1=3"],
+            r"--drive: names a joint twice \(got 'A1=3'\)",
+        ),
         (["kinematics", "five_bar", "--drive", "A1=2", "--drive", "A2=3"], "--drive: nothing moves where all"),
         (["kinematics", "five_bar", "--drive", "A1, A2"], "--drive: several joints .*; give one --drive for each"),
         (["kinematics", "FILE", "--drive", "o"], r"--drive: unknown joint \(got 'o'\); did you mean \"O\"\?"),

@@ -226,6 +226,11 @@ COMMANDS = [
         "--after: the model has no path after which motors could be held",
     ),
     (["run", "-m", "five_bar", "--path", "nothing"], 2, "path"),
+    (
+        ["run", "-m", "five_bar", "--mode", "+- servo"],
+        2,
+        '--mode: mode "+- servo" cannot drive the mechanism: 1 active',
+    ),
     (["run", "-m", "five_bar", "--stop-at", "nothing"], 2, "--stop-at: not an event (got 'nothing'); write "),
     (["run", "-m", "five_bar", "--rigid", "--ked"], 2, "--rigid: cannot be combined"),
     (["run", "-m", "five_bar", "--segments", "0"], 2, "--segments: must be positive (got 0); "),
@@ -250,6 +255,22 @@ def test_commands_answer_in_one_line(tmp_path, monkeypatch, capsys, arguments, c
     assert says in last
     assert "; " in last
     assert list(tmp_path.iterdir()) == []
+
+
+def test_drives_that_contradict_one_another_are_those_of_the_file(tmp_path, monkeypatch, capsys):
+    file = tmp_path / "disc.toml"
+    file.write_text(
+        'name = "disc"\nground = { O = [0, 0] }\njoint = { O = ["ground.O", "disc.O"] }\n'
+        "[body.disc]\nmass = 1\ninertia = 0.01\npoints = { O = [0, 0], P = [0.1, 0] }\n"
+        '[prescribed]\na = { joint = "O", speed = 1 }\nb = { joint = "O", speed = 2 }\n'
+        "[assembly]\nstart = { disc = 0 }\n[study]\nduration = 1\n"
+    )
+    assert command(monkeypatch, "run", "-m", str(file), "--out", str(tmp_path / "out")) == 2
+    says = (
+        f"error: {file}: prescribed: the velocities of constraints contradict one another, by 1 m/s or rad/s: b, a, at"
+    )
+    assert says in capsys.readouterr().err
+    assert list(tmp_path.iterdir()) == [file]
 
 
 # --- Files ---------------------------------------------------------------------------------------------------------

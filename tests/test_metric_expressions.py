@@ -152,6 +152,7 @@ def test_identification_and_sensitivities_take_expressions(tmp_path):
 REFUSED = [
     ("max(foo.x)", "no such quantity (got 'foo.x'); choose from "),
     ("max(A1.angel)", "no such quantity (got 'A1.angel'); did you mean \"A1.angle\"?"),
+    ("max(tau1.angle)", "no such quantity (got 'tau1.angle'); did you mean \"A1.angle\"?"),
     ("max(A1)", "no such quantity (got 'A1'); choose from A1.angle, A1.rate,"),
     ("max(A1.travel)", "the joint turns: it has no travel (got 'A1.travel'); write A1.angle"),
     ("max(tau1.force)", "the joint of tau1 turns, so that it has a torque (got 'tau1.force'); write tau1.torque"),

@@ -97,7 +97,10 @@ TABLE = '[path.p]\ntype = "table"\n'
         (TABLE + 'table = "missing.csv"\nmotion_time = 1', "path.p.table: cannot be read (no such file or directory)"),
         (TABLE + 'table = "one.csv"\nmotion_time = 1', "path.p.table: line 1 of one.csv is not two or three numbers"),
         (TABLE + 'table = "ragged.csv"\nmotion_time = 1', "path.p.table: line 3 of ragged.csv is not two or three"),
-        (TABLE + 'table = "none.csv"\nmotion_time = 1', "path.p.table.1.1: should be a finite number"),
+        (
+            TABLE + 'table = "none.csv"\nmotion_time = 1',
+            "path.p.table: line 2 of none.csv has a number that is not finite",
+        ),
         (TABLE + "table = [[0, 0], [1, 0], [1, 0], [2, 0]]\nmotion_time = 1", "path.p.table: points 2 and 3 coincide"),
         (TABLE + "table = [[0, 0], [1, 0], [1, 1]]\nmotion_time = 1", "path.p.table: not a list of points"),
         (

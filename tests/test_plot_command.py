@@ -378,7 +378,7 @@ def test_the_command_draws_the_figures_of_points(results: Path, tmp_path: Path) 
     ("words", "said"),
     [
         (("--style", "triple"), "--style: neither a width nor a style"),
-        (("--format", "tiff"), "--format: unknown format"),
+        (("--format", "gif"), "--format: unknown format (got 'gif'); choose from png, svg, pdf, pgf"),
         (("--format", ","), "--format: unknown format"),
         (("--dpi", "0"), "--dpi"),
         (("--dpi", "nan"), "--dpi"),

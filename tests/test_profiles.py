@@ -297,6 +297,11 @@ STUDY = "[study]\nduration = 2.0\n"
         ('table = "odd.csv"', "prescribed.drive.table: line 3 of odd.csv is not two numbers (got '1;2;3')"),
         ('table = "binary.csv"', "prescribed.drive.table: not a text file in UTF-8 (got 'binary.csv')"),
         ('table = "heads.csv"', "prescribed.drive.table: line 2 of heads.csv is not two numbers (got 'in s, in rad')"),
+        ('table = "empty.csv"', "prescribed.drive.table: empty.csv has no row of numbers; give a time"),
+        ('table = "gap.csv"', "prescribed.drive.table: line 2 of gap.csv has a number that is not finite"),
+        ('ramps = "gap.csv"', "prescribed.drive.ramps: line 2 of gap.csv has a number that is not finite"),
+        ('table = "comma.csv"', "prescribed.drive.table: line 2 of comma.csv is not two numbers "
+         "(got '0,5;1,5'); write decimal points in place of decimal commas"),
         ('table = "wide.csv"', "prescribed.drive.table: line 1 of wide.csv is not two numbers (got '0,1,2')"),
     ],
 )  # fmt: skip
@@ -304,6 +309,9 @@ def test_profiles_that_make_no_sense_are_refused_by_name(tmp_path, text, says):
     (tmp_path / "odd.csv").write_text("t;angle\n0;1\n1;2;3\n")
     (tmp_path / "binary.csv").write_bytes(b"\xff\xfe\x00\x01")
     (tmp_path / "heads.csv").write_text("time, angle\nin s, in rad\n0, 1\n")
+    (tmp_path / "empty.csv").write_text("")
+    (tmp_path / "gap.csv").write_text("0, 1\n1, nan\n")
+    (tmp_path / "comma.csv").write_text("0;1\n0,5;1,5\n")
     (tmp_path / "wide.csv").write_text("0,1,2\n1,2,3\n")
     file = write(tmp_path, text)
     with pytest.raises(InputError) as caught:

@@ -201,6 +201,34 @@ def test_buckling_factors_take_the_turn_of_links_with_them():
         assert factor - 1.0 == pytest.approx(left, rel=0.1)
 
 
+@pytest.mark.parametrize(("load", "buckles"), [(6.0, True), (40.0, False)])
+def test_estimates_with_a_stiffening_law_are_those_of_its_tangent(load, buckles):
+    """A rigid arm on a spring of torque -20 (x - 0.3) - 30 x^3 is turned by a force across.
+
+    The stiffness 20 + 90 x^2 - F l sin x first decreases and then increases, so that nothing buckles.
+    """
+    arm = pf.RigidBody("arm", mass=1.0, inertia=0.02, centre_of_mass=(0.0, 0.0), points={"O": (0, 0), "E": (0.5, 0)})
+    mechanism = pf.Mechanism(
+        name="arm", ground={"O": (0.0, 0.0)}, bodies=(arm,), joints=(pf.RevoluteJoint("O", "ground.O", "arm.O"),),
+        springs=(pf.TorsionalSpring("coil", "O", torque=pf.ForceLaw("-20 * (O.angle - 0.3) - 30 * O.angle**3")),),
+        assemblies=(pf.Assembly("up", {"arm": 0.2}),),
+    )  # fmt: skip
+    found = pf.statics(mechanism, loads={"arm.E.y": -load}, held=[], steps=4)
+    x, force = found.q[:, 2], -load * found.fraction
+    assert 20.0 * (x - 0.3) + 30.0 * x**3 == pytest.approx(0.5 * force * np.cos(x), abs=1e-8)
+    tangent = 20.0 + 90.0 * x**2 + 0.5 * force * np.sin(x)
+    assert found.frequencies[:, 0] ** 2 * 0.02 == pytest.approx(tangent, rel=1e-8)
+    turn = -0.5 * load * np.cos(x) / tangent
+    change = 180.0 * x * turn - 0.5 * load * np.sin(x) + 0.5 * force * np.cos(x) * turn
+    if buckles:
+        assert (change < 0.0).all()
+        assert found.buckling[:, 0] == pytest.approx(found.fraction - tangent / change, rel=1e-5)
+    else:
+        assert change[0] < 0.0 < change[-1]
+        assert np.isnan(found.buckling).all()
+        assert "as seen from which nothing buckles" in found.equilibria[0].buckling.reason
+
+
 def test_below_the_limit_the_branch_ends_with_what_is_given() -> None:
     limit = truss_force(snap_height())
     found = pf.statics(truss(), loads={"apex.T.y": -0.9 * limit}, held=["apex.T.angle"], steps=3)

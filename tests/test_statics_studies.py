@@ -233,6 +233,8 @@ def test_a_stiffness_is_sought_in_n_per_mm(tmp_path):
     ("metric", "message"),
     [
         ("max(abs(stage.T.q))", "unknown coordinate (got 'stage.T.q')"),
+        ("max(abs(A.forc))", "unknown coordinate (got 'A.forc'); did you mean \"A.force\"?"),
+        ("nope", "unknown metric (got 'nope'); choose from deflection_max,"),
         ("max(stiffness.stage.T.angle)", "unknown direction (got 'stage.T.angle')"),
         ("largest(stage.T.y)", "unknown function \"largest\" (got 'largest(stage.T.y)')"),
         ("max(abs(stage.T.y)", "no such expression of a metric (got 'max(abs(stage.T.y)')"),

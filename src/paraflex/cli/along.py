@@ -9,13 +9,14 @@ from typing import Any
 
 from rich.progress import TimeElapsedColumn
 
+from paraflex.actuation.allocation import check_mode
 from paraflex.campaign import OnProgress, Progress
 from paraflex.checks import check_planned
 from paraflex.compilation import compile_all_kernels, compile_kernels
 from paraflex.control import ControllerDescription, simulate_controlled
 from paraflex.designs.measure import metrics_of
 from paraflex.elastodynamics import simulate_ked
-from paraflex.errors import InputError
+from paraflex.errors import ActuationError, InputError, SingularActuationError
 from paraflex.fem import ReferenceCondition
 from paraflex.files import Model
 from paraflex.files.library import errors_elsewhere
@@ -80,6 +81,7 @@ def run_along(
         task, full, reduction = requested_tasks(request, model, mechanism, (path, name), modes, options)
         if request.segments is not None:
             check_stops(task.mechanism, options, request.stop_at)
+        _check_mode(request, model, task, modes)
         with flagged(request, first=True):
             metrics_of(request.metrics, model.study.error, task.mechanism, PATH, float(task.motion.t[-1]))
         run = {
@@ -102,6 +104,19 @@ def run_along(
         )  # fmt: skip
         planned.append(_Along(name, study, folder, f'path "{name}": ' if len(paths) > 1 else ""))
     return _run(request, model, planned, _model_name(request, mechanism), began)
+
+
+def _check_mode(request: RunRequest, model: Model, task: TrackingTask, modes: Sequence[ActuationMode]) -> None:
+    """Check that the only mode can drive the mechanism somewhere; one of several fails without the others."""
+    if len(modes) > 1:
+        return
+    try:
+        check_mode(task.effort, modes[0])
+    except SingularActuationError:
+        return
+    except ActuationError as error:
+        field, source = ("--mode", "") if request.modes else (f"mode.{modes[0].name}", model.source)
+        raise InputError(error.problem, field=field, remedy=error.remedy, source=source) from error
 
 
 def _errors_elsewhere(request: RunRequest, model: Model) -> dict[str, dict[str, dict[str, float]]]:

@@ -84,9 +84,10 @@ def _asked(model: Model, request: KinematicsRequest) -> dict[str, Any]:
     for text in request.drive:
         joint, _, value = (part.strip() for part in text.rpartition("="))
         if text not in moving:
-            if joint in held or not value:
-                problem = "holds a joint twice" if joint in held else "has no value"
-                raise InputError(problem, field="--drive", value=text, remedy='write one such as "JOINT=30 deg"')
+            if joint in (*held, drive):
+                raise InputError("names a joint twice", field="--drive", value=text, remedy="leave one out")
+            if not value:
+                raise InputError("has no value", field="--drive", value=text, remedy='write one such as "JOINT=30 deg"')
             held[joint] = _ends(joint, value, "m" if slides.get(joint) else "rad")
     ends = dict[str, Any]()
     if drive is None and request.start is None and request.end is None:

@@ -7,7 +7,7 @@ from dataclasses import asdict
 from typing import Any
 
 from paraflex.control.laws.described import NONE, ControllerDescription
-from paraflex.errors import AssemblyError, InputError, UnreachablePathError, renamed
+from paraflex.errors import AssemblyError, InconsistentConstraintsError, InputError, UnreachablePathError, renamed
 from paraflex.files import Model, generator_names, library_names, load, load_path
 from paraflex.files.outside import may_be_outside
 from paraflex.files.overlay import value_of
@@ -149,11 +149,14 @@ def check_time(at: float) -> None:
 
 @contextmanager
 def locating_errors(model: Model) -> Iterator[None]:
-    """Convert input and assembly errors within the context to errors that name the option or file at fault."""
+    """Convert errors of input, assembly and start in the context to errors that name the option or file at fault."""
     try:
         yield
     except AssemblyError as error:
         raise of_assembly(error, model) from error
+    except InconsistentConstraintsError as error:
+        field = "prescribed" if model.mechanism.prescribed else "start"
+        raise InputError(error.problem, field=field, remedy=error.remedy, source=model.source) from error
     except InputError as error:
         raise located_error(error, model) from error.__cause__
 

@@ -114,8 +114,9 @@ def metrics_of(
         A name is unknown, such runs do not have the metric, or an expression does not fit the mechanism.
     """
     members = None if mechanism is None or runs == STATICS else MetricMembers(mechanism)
+    own = [one.name for one in METRICS.values() if runs in one.runs]
     for name in names:
-        check_metric(name, members=members)
+        check_metric(name, known=own, members=members)
         if name not in METRICS:
             raise InputError(
                 f"a metric of each {metric_of(name).each or 'run'} is kept of all", field="metrics", value=name,

@@ -6,6 +6,7 @@ from paraflex.arrays import Array
 from paraflex.errors import InputError
 from paraflex.kernel.loads import lines_along, loads_along
 from paraflex.kernel.packed import make_scratch
+from paraflex.mechanism import ForceLaw
 from .signals import acting_loads
 from .system import System
 
@@ -40,13 +41,19 @@ def check_laws(system: System, t: Array, q: Array, v: Array) -> None:
     if not system.packed.laws.size:
         return
     found = [*load_values(system, t, q, v).swapaxes(0, 1), *line_laws(system, q, v).T[:, :, None]]
-    named = [(f"load.{load.name}.{load.kind}", load.laws) for load in system.mechanism.loads]
+    loads = system.mechanism.loads
+    named = [(_of_spring(load.laws) or f"load.{load.name}.{load.kind}", load.laws) for load in loads]
     named += [(f"linear_spring.{one.name}.force", one.laws) for one in system.mechanism.linear_springs]
     for (field, laws), values in zip(named, found, strict=True):
         if not (finite := np.isfinite(values).all(axis=1)).all():
             problem = f"not a finite number at t = {t[~finite][0]:g} s"
             remedy = "begin in another pose, or write a finite law"
             raise InputError(problem, field=field, value=", ".join(map(str, laws)), remedy=remedy)
+
+
+def _of_spring(laws: tuple[ForceLaw, ...]) -> str:
+    """Return the field of the spring whose law a load holds; empty if it holds none."""
+    return next((law.field for law in laws if law.field.startswith("spring.")), "")
 
 
 def law_lost(system: System, time: float, q: Array, v: Array, duration: float) -> str:

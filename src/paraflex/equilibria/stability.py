@@ -161,7 +161,7 @@ def checked(ahead: Sequence[tuple[Point, Vibrations, Buckling]], count: int) -> 
     If stable equilibria lead to a limit point, the factors are those of the limit point.
     """
     point, vibration, own = ahead[0]
-    reached, lost = point.at.s, np.inf
+    reached, lost, last = point.at.s, np.inf, own
     for there, moving, that in ahead[1:] if vibration.stable and not point.limit else ():
         if there.at.s <= reached:
             break
@@ -171,10 +171,13 @@ def checked(ahead: Sequence[tuple[Point, Vibrations, Buckling]], count: int) -> 
         if there.limit or not moving.stable:
             lost = there.at.s
             break
-        reached = there.at.s
+        reached, last = there.at.s, that
     first = own.factors[0] if count else np.nan
-    if first > lost or (first <= reached and reached > point.at.s):
-        until = f", unstable from {lost:.4g} on" if lost < np.inf else ""
+    # Extrapolation from a step does not hold if the stiffness no longer decreases at a later one.
+    stiffening = lost == np.inf and not last.reason and np.isnan(last.factors[:1]).any() and not np.isnan(first)
+    if first > lost or (first <= reached and reached > point.at.s) or stiffening:
+        until = ", as seen from which nothing buckles" if stiffening else ""
+        until = f", unstable from {lost:.4g} on" if lost < np.inf else until
         return Buckling(
             np.full(count, np.nan), np.full_like(own.shapes[:, :count], np.nan),
             f"the branch contradicts the linear estimate: stable up to load factor {reached:.4g}{until}",

@@ -333,22 +333,22 @@ def allowed_call(name: str, arguments: int) -> None:
         raise ExpressionError(f"{name} takes one argument, not {arguments}", f"write {name}(...)")
 
 
-def look_up(name: str, parameters: Mapping[str, float]) -> float:
-    """Return the value of a parameter or constant; raise an ExpressionError if there is none of this name."""
+def look_up(name: str, parameters: Mapping[str, float], remedy: str = "") -> float:
+    """Return the value of a parameter or constant; raise an ExpressionError, with a remedy, if there is none."""
     if name in parameters:
         return parameters[name]
     if name in CONSTANTS:
         return CONSTANTS[name]
-    raise _unknown(name, parameters)
+    raise _unknown(name, parameters, remedy)
 
 
-def _unknown(name: str, parameters: Mapping[str, Any]) -> ExpressionError:
+def _unknown(name: str, parameters: Mapping[str, Any], also: str = "") -> ExpressionError:
     """Return the error for a name that is none of the parameters and constants."""
     if name in FUNCTIONS:
         return ExpressionError(f"{name} is a function", f"write {name}(...)")
     if not name.isidentifier():
         return not_allowed()
-    remedy = suggestion(name, parameters)
+    remedy = "; ".join(filter(None, [suggestion(name, parameters) if parameters or not also else "", also]))
     if name in UNITS:
         remedy = f'a unit stands behind a number, units with a space between them: "1 {name}", "5 N m"'
     return ExpressionError(f'unknown parameter "{name}"', remedy)

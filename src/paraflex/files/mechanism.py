@@ -35,7 +35,7 @@ from paraflex.mechanism import (
 )
 from paraflex.mechanism.bodies import BODY_KINDS
 from paraflex.mechanism.loads import InTime
-from paraflex.mechanism.quantities import known
+from paraflex.mechanism.quantities import check_numbers, known
 from paraflex.mechanism.sections import SHAPES
 from paraflex.paths import Path
 from .field_values import check_fields
@@ -125,8 +125,10 @@ def read_section(name: str, table: SectionTable) -> Section:
         raise error.at(f"section.{name}.{error.field.rpartition('.')[2]}") from None
 
 
-def _material(_: str, table: Any) -> Material:
-    return Material(**dict(table))
+def _material(name: str, table: Any) -> Material:
+    material = Material(**dict(table))
+    check_numbers(material, f"material.{name}")
+    return material
 
 
 def _named(tables: Mapping[str, Any], name: str, where: str, kind: str) -> Any:

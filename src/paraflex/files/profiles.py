@@ -230,10 +230,10 @@ def read_components(
     components = tuple(map(_number_if_constant, _profiles(entry, parameters)))
     if over is not None:
         # A column of one number is no law.
-        laws = (ForceLaw(over, parameters, table=each) if isinstance(each, TabulatedProfile) else each
-                for each in components)  # fmt: skip
-        with renamed("over", only="force"):
-            return tuple(laws)
+        return tuple(
+            ForceLaw(over, parameters, table=each, field="over") if isinstance(each, TabulatedProfile) else each
+            for each in components
+        )
     for profile in components:
         if isinstance(profile, TimeProfile):
             _try(profile, duration)

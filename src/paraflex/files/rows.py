@@ -29,6 +29,7 @@ _VALUES = {
     _PATH: "x and y in m, and perhaps a time",
 }
 _SEPARATOR = re.compile(r"\s*[,;\t]\s*|\s+")
+_DECIMAL_COMMA = re.compile(r"\d,\d")
 _BETWEEN_HEADINGS = re.compile(r"[,;\t]")
 # Patterns of a unit at the end of a heading; round brackets may also hold a remark.
 _SQUARE_ANYWHERE = re.compile(r"\[([^\[\]]*)\]")
@@ -127,6 +128,9 @@ def _rows_of(
 ) -> list[list[float]]:
     """Convert the lines of a file to rows in SI units, for the table at a place."""
     field, count = _field(place), _COUNTS[columns]
+    over = value_at(data, (*place[:-1], "over"))
+    first = "a time in s" if over is None else f"{over} in {unit_over(over) or 'SI units'}"
+    wanted = _VALUES[columns].replace("a time in s", first)
     rows: list[list[float]] = []
     headings, comment = None, ""
     for number, line in enumerate(lines, start=1):
@@ -137,14 +141,19 @@ def _rows_of(
         if row is None and not rows and headings is None and not any(map(_is_number, _SEPARATOR.split(line.strip()))):
             headings = line
         elif row is None:
-            over = value_at(data, (*place[:-1], "over"))
-            first = "a time in s" if over is None else f"{over} in {unit_over(over) or 'SI units'}"
+            remedy = f"give {wanted} in every line below the headings"
+            if _DECIMAL_COMMA.search(line) and ";" in line:
+                remedy = "write decimal points in place of decimal commas"
             raise InputError(
-                f"line {number} of {name} is not {count} numbers", field=field, value=line.strip(),
-                remedy=f"give {_VALUES[columns].replace('a time in s', first)} in every line below the headings",
-            )  # fmt: skip
+                f"line {number} of {name} is not {count} numbers", field=field, value=line.strip(), remedy=remedy
+            )
+        elif not all(map(isfinite, row)):
+            problem = f"line {number} of {name} has a number that is not finite"
+            raise InputError(problem, field=field, value=line.strip(), remedy="leave the line out, or give its numbers")
         else:
             rows.append(row)
+    if not rows:
+        raise InputError(f"{name} has no row of numbers", field=field, remedy=f"give {wanted} in each line")
     if rows and headings is None and len(_SQUARE_ANYWHERE.findall(comment)) == len(rows[0]):
         headings = comment
     return _in_si(data, place, name, headings, rows) if rows and headings else rows

@@ -162,7 +162,9 @@ def check_loads(mechanism: Members) -> None:
     places += [(f"spring.{one.name}", one.torque) for one in mechanism.springs if one.torque is not None]
     for place, law in places:
         for quantity in law.quantities.values():
-            _check_quantity(mechanism, quantity, f"{place}.{law.field}")
+            _check_quantity(
+                mechanism, quantity, law.field if law.field.startswith("spring.") else f"{place}.{law.field}"
+            )
 
 
 def _check_quantity(mechanism: Members, quantity: MotionQuantity, field: str) -> None:

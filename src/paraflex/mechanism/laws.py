@@ -96,13 +96,13 @@ class ForceLaw(CheckedFields):
         super().__post_init__()
         with expressed_in(self.field, self.text):
             names = names_in(self.text)
-        used = {name: value for name, value in self.parameters.items() if name in names}
-        object.__setattr__(self, "parameters", used)
         if not self.quantities and self.table is not None:
             raise InputError(
                 "contains no joint and no point", field=self.field, value=self.text,
                 remedy="name one, say slider.travel, stage.T.y or spring.length",
             )  # fmt: skip
+        used = {name: value for name, value in self.parameters.items() if name in names}
+        object.__setattr__(self, "parameters", used)
 
     def __str__(self) -> str:
         return self.text if self.table is None else f"table over {self.text}"

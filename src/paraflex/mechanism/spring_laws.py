@@ -32,13 +32,14 @@ def with_spring_laws(mechanism: Members) -> dict[str, tuple[Any, ...]]:
 
 def _load(mechanism: Members, spring: TorsionalSpring) -> Load:
     """Return the law of a spring as a load on the second body of its joint, with the opposite on the first."""
-    joint, law = mechanism.joint(spring.joint), spring.torque
-    assert law is not None
+    joint, field = mechanism.joint(spring.joint), f"spring.{spring.name}.torque"
+    assert spring.torque is not None
+    law = replace(spring.torque, field=field)
     if joint.slides:
         # On another body the opposite would act at the joint's point there, and the direction would turn with it.
         if not joint.a.on_ground:
             raise InputError(
-                "the axis of its joint moves, along which its force would act", field=f"spring.{spring.name}.torque",
+                "the axis of its joint moves, along which its force would act", field=field,
                 value=joint.name, remedy="give a stiffness, or the force of a [linear_spring] between two points",
             )  # fmt: skip
         axis = (cos(joint.direction), sin(joint.direction))

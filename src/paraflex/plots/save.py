@@ -14,7 +14,7 @@ from paraflex.errors import InputError
 from paraflex.figures.charts import TIME
 from paraflex.figures.kinematics import kinematics_of
 from paraflex.folders import added_to
-from paraflex.mechanism.quantities import all_known
+from paraflex.mechanism.quantities import all_listed
 from paraflex.results.kinds import kind_of
 from paraflex.writing import portable_name, whole_file
 from .layout import column_width
@@ -123,7 +123,7 @@ def write_figures(
     InputError
         A format is unknown or needs LaTeX, which is missing, or a file exists and `force` is False.
     """
-    all_known(formats or ("",), FIGURE_FORMATS, "--format", "format")
+    all_listed(formats or ("",), FIGURE_FORMATS, "--format", "unknown format")
     check_latex(formats)
     files = {drawing.stem: [folder / f"{portable_name(drawing.stem)}.{name}" for name in formats] for drawing in drawn}
     there = [file for each in files.values() for file in each if file.exists()]

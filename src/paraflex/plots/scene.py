@@ -249,9 +249,8 @@ def scene(run: Run, times: Array, magnify: float = 1.0, points: Sequence[str] = 
         The magnification is negative or not finite, the run has no sample, or there is no such point.
     """
     if not (np.isfinite(magnify) and magnify >= 0.0):
-        raise InputError(
-            "must not be negative", field="magnify", value=magnify, remedy="1 is the actual deflection, 50 magnifies it"
-        )
+        problem = "must not be negative" if magnify < 0.0 else "not a finite number"
+        raise InputError(problem, field="magnify", value=magnify, remedy="1 is the actual deflection, 50 magnifies it")
     kept = np.isfinite(run["shape"].values).any(axis=(1, 2))
     samples = int(np.argmin(kept)) if not kept.all() else kept.size
     if not samples:

@@ -24,7 +24,7 @@ from paraflex.mechanism.quantities import known
 from paraflex.units import WHERE_IT_SLIDES
 from .formulas import drift_speed, largest_norm, overshoot, rms, settling_time, stress_at, vibration
 from .metric_expressions import MetricExpression, parsed
-from .motion_quantities import JOINT_LOADS, MOTOR_WORDS, Quantity, is_static, quantity_named
+from .motion_quantities import JOINT_LOADS, MOTOR_WORDS, Quantity, is_static, quantity_named, quantity_names
 from .traces import Trace
 
 if TYPE_CHECKING:
@@ -88,6 +88,9 @@ class MetricMembers(dict[str, Sequence[str]]):
             if name not in self[COORDINATE] and is_static(name):
                 return quantity_named(name, self.mechanism)
             trace, member = _OF_COORDINATES[0], name
+            if name not in self[COORDINATE]:
+                own = [one for one in quantity_names(self.mechanism) if is_static(one)]
+                known(name, list(dict.fromkeys([*self[COORDINATE], *own])), "metrics", COORDINATE)
         metric = METRICS[trace]
         known(member, self[metric.each], "metrics", metric.each)
         at = list(self[metric.each]).index(member)

@@ -74,8 +74,10 @@ def quantity_named(name: str, mechanism: Mechanism) -> Quantity:
         unit, derivative, axis = _POINT_WORDS[word]
         point = PointRef.parse(owner, "metrics")
         return Quantity(unit, lambda run, _: run.point_motion(point)[derivative][:, axis])
-    names = list(_names(mechanism))
-    near = [one for one in names if one.startswith((f"{name}.", f"{owner}."))]
+    names = list(quantity_names(mechanism))
+    driven = [f"{one.joint}.{word}" for one in (*mechanism.motors, *mechanism.prescribed) if one.name == owner]
+    near = [one for one in driven if one in names]
+    near = near or [one for one in names if one.startswith((f"{name}.", f"{owner}."))]
     raise InputError("no such quantity", field="metrics", value=name, remedy=suggestion(name, near or names))
 
 
@@ -84,7 +86,7 @@ def is_static(name: str) -> bool:
     return name.rpartition(".")[2] in (*JOINT_LOADS, *_BODY_WORDS, "angle", "travel", "x", "y")
 
 
-def _names(mechanism: Mechanism) -> Iterator[str]:
+def quantity_names(mechanism: Mechanism) -> Iterator[str]:
     """Yield the names of the quantities of a mechanism."""
     for joint in mechanism.joints:
         own = [word for word, units in _JOINT_WORDS.items() if units[joint.slides]]
