@@ -311,7 +311,7 @@ def test_a_flywheel_absorbs_the_fluctuation_of_a_slider_crank():
         with pytest.raises(InputError, match="fluctuation: not between 0 and 1"):
             pf.flywheel(motion, wrong)
     with pytest.raises(InputError, match="the motion has no loads"):
-        pf.flywheel(pf.kinematics(pf.load("four_bar")), 0.05)
+        pf.flywheel(pf.kinematics(pf.load("four_bar"), "O"), 0.05)
     with pytest.raises(InputError, match="whole turn"):
         pf.flywheel(pf.torques(pf.load("four_bar"), "O", start=0.0, end=1.0), 0.05)
 
@@ -426,7 +426,7 @@ def test_a_named_drive_leaves_the_prescribed_motions_of_other_freedoms():
 def test_a_flywheel_needs_enough_samples_and_a_torque_that_repeats():
     model = pf.load("four_bar")
     with pytest.raises(InputError, match="samples: too few samples for a flywheel"):
-        pf.flywheel(pf.torques(model, samples=5), 0.05)
+        pf.flywheel(pf.torques(model, "O", samples=5), 0.05)
     sine = pf.SampledAngle(
         lambda t: np.sin(3.3 * t), lambda t: 3.3 * np.cos(3.3 * t), lambda t: -10.89 * np.sin(3.3 * t)
     )
@@ -693,6 +693,17 @@ def test_a_duration_gives_the_end_of_a_drive():
     motion = pf.kinematics(pf.load("four_bar"), "O", start=0.5, speed=2.0, duration=0.25)
     assert motion.drive.end == pytest.approx(1.0, abs=1e-15)
     assert motion.solution.t[-1] == pytest.approx(0.25, abs=1e-15)
+
+
+def test_a_prescribed_speed_lasts_as_long_as_the_study():
+    model = pf.load("four_bar")
+    assert (model.study.duration, pf.kinematics(model, samples=3).solution.t[-1]) == (0.7, pytest.approx(0.7))
+    assert pf.kinematics(model, duration=0.2, samples=3).drive.duration == pytest.approx(0.2)
+    for turns_once in (pf.kinematics(model, "O", samples=3), pf.kinematics(model, speed=7.0, samples=3),
+                       pf.kinematics(model.mechanism, samples=3)):  # fmt: skip
+        assert turns_once.drive.full_turn
+    with pytest.raises(InputError, match=r"duration: more than 20 turns \(got 9\.0\); give less, or name the drive"):
+        pf.kinematics(replace(model, study=replace(model.study, duration=9.0)))
 
 
 def test_an_assembly_that_had_to_be_moved_is_reported():

@@ -159,7 +159,8 @@ def kinematics(
         Speed of the drive [rad/s, m/s]; by default that of the prescribed motion at its joint, else 1.
     duration : float, optional
         Duration [s]: of the drive in place of its end, else of prescribed motions, by default that of the model's
-        study, or of the motion along a path, by default the path's.
+        study (without one, a single motion of constant speed makes a turn), or of the motion along a path, by default
+        the path's.
     samples : int
         Number of samples, evenly spaced, both ends included.
     assembly : str, optional
@@ -197,13 +198,14 @@ def kinematics(
         follow = path_follower(moved, way, last, assembly=chosen, orientation=orientation)
         rigid = follow(np.linspace(0.0, last, samples))
         return _motion(moved, (rigid.t, rigid.q, rigid.v, rigid.a), began, None, follow.closure, rigid=rigid, path=name)
+    if duration is None and drive is None and not wish.of_drive and moved.prescribed:
+        duration = getattr(getattr(mechanism, "study", None), "duration", None)
+        wish = wish._replace(duration=duration)
     system = build_system(replace(moved, prescribed=()))
     near = reference_pose(system, chosen)
     law = chosen_drive(moved, wish, freedoms, system, near)
     if law is None:
         check_determined(moved, freedoms)
-        if duration is None:
-            duration = getattr(getattr(mechanism, "study", None), "duration", None)
         if duration is None:
             raise InputError("is missing", field="duration", remedy="give it in seconds, or name a drive")
         check_times(duration, None)

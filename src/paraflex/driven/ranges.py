@@ -121,7 +121,9 @@ def chosen_drive(mechanism: Mechanism, wish: Wish, freedoms: int, system: System
     if found.turns > _MOST_TURNS or max(abs(start), abs(last)) > _MOST_TURNS * max(turn, 2.0 * math.pi):
         field = "duration" if wish.duration is not None else "start" if wish.end is None else "end"
         example = {"rad": "90 deg", "m": "50 mm"}[unit]
-        remedy = f'in another unit? It is in {unit}, or write "{example}"' if field != "duration" else "give less"
+        remedy = f'in another unit? It is in {unit}, or write "{example}"'
+        if field == "duration":
+            remedy = "give less" if wish.drive else "give less, or name the drive, which turns once"
         raise InputError(
             f"more than {_MOST_TURNS:g} turns" if unit == "rad" else "too far", field=field,
             value=getattr(wish, field), remedy=remedy,
