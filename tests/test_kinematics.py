@@ -14,6 +14,7 @@ import paraflex as pf
 from paraflex.errors import InputError, UnreachablePathError
 from paraflex.figures.run_motion import point_paths
 from paraflex.figures.selection import as_runs
+from paraflex.formatting import output_units
 from shell import paraflex
 
 REFERENCE = {
@@ -487,8 +488,17 @@ def test_a_crossed_parallelogram_stays_crossed():
 
 def test_a_motion_from_an_assembly_at_a_change_point_is_refused():
     folded = pf.Assembly("folded", {"crank": math.pi, "coupler": 0.0, "rocker": math.pi})
-    with pytest.raises(UnreachablePathError, match=r"change point or a limit of reach near O at 3\.14159 rad"):
+    says = (
+        r"^the assembly is at a change point, O at 180 deg, where others meet it; .* another position, 1\.00 deg away"
+    )
+    with output_units(["deg"]), pytest.raises(UnreachablePathError, match=says):
         pf.kinematics(replace(PARALLELOGRAM, assemblies=(folded,)), "O")
+    # Rounding is not shown, and as far away the motion may start there.
+    flat = pf.Assembly("flat", {"crank": -1e-25, "coupler": 0.0, "rocker": 0.0})
+    with pytest.raises(UnreachablePathError, match="change point, O at 0 rad, where"):
+        pf.kinematics(replace(PARALLELOGRAM, assemblies=(flat,)), "O", start=0.5)
+    away = pf.Assembly("away", {"crank": math.radians(1), "coupler": 0.0, "rocker": math.radians(1)})
+    assert len(pf.kinematics(replace(PARALLELOGRAM, assemblies=(away,)), "O", start=0.0, samples=5).passed) == 3
 
 
 def angles_of(motion):
@@ -717,6 +727,11 @@ def test_an_assembly_that_had_to_be_moved_is_reported():
     (one,) = pf.kinematics(beyond, "Q", end=1.8).findings
     assert one.code == "assembly-moved"
     assert "do not close with Q at 1.22173 rad as given" in one.text
+    # A start within reach is taken, and one that is not is told the limits.
+    assert pf.kinematics(beyond, "Q", start=2.0, end=1.8, samples=3).drive.start == 2.0
+    says = r"start: not between the limits of reach of Q, 1\.67096 rad and 2\.49809 rad \(got 3\.0\); give one between"
+    with pytest.raises(InputError, match=says):
+        pf.kinematics(beyond, "Q", start=3.0, end=1.8)
 
 
 def test_drives_are_named_as_the_user_does():
