@@ -12,9 +12,11 @@ import scipy
 
 import paraflex as pf
 from paraflex.errors import InputError, UnreachablePathError
-from paraflex.figures.run_motion import point_paths
+from paraflex.figures.kinematics import kinematics_of, kinematics_tables
+from paraflex.figures.run_motion import moving_points, point_paths
 from paraflex.figures.selection import as_runs
 from paraflex.formatting import output_units
+from paraflex.results.kinematics import add_kinematics
 from shell import paraflex
 
 REFERENCE = {
@@ -274,6 +276,7 @@ def test_a_point_at_the_instant_centre_has_a_cusp_there():
 def test_all_assemblies_of_a_four_bar_are_the_two_mirrored_in_its_diagonal():
     found = pf.kinematics(four_bar(0.4, 0.1, 0.35, 0.25), "O", start=1.0).assemblies()
     assert len(found) == 2
+    assert all(-math.pi <= angle < math.pi for angle in found[1].angles.values())
     A = 0.1 * np.array([math.cos(1.0), math.sin(1.0)])
     diagonal = math.atan2(-A[1], 0.4 - A[0])
     both = sum(one.angles["coupler"] for one in found) - 2 * diagonal
@@ -828,12 +831,35 @@ def test_paths_of_points_mark_cusps_and_crunodes(rocker):
     assert "crunode" not in {curve.name for curve in only.curves}
 
 
+def test_tables_show_no_rounding_and_name_points_as_figures_do(rocker):
+    motion = pf.kinematics(pf.load(rocker), "O", start=1.0)
+    data = pf.motion_dataset(motion)
+    add_kinematics(data, motion, assemblies=True)
+    found = kinematics_of(data)
+    found["trails"]["coupler.P"]["crunodes"][0]["position"] = [0.1, -7e-18]
+    found["assemblies"][0]["angles"]["rocker"] = 8e-17
+    data.attrs["kinematics"] = json.dumps(found)
+    tables = {table.title: table for table in kinematics_tables(data)}
+    assert tables["Special points of coupler curves"].texts()[0][2:4] == ["100", "0"]
+    assert tables["Assemblies"].texts()[0][3] == "0"
+    # Of coincident points the first is shown, whichever travels farther by rounding, or else the end-effector.
+    names = [str(name) for name in data["point"].values]
+    shown = ["crank.A", "coupler.B", "coupler.P"]
+    data["point_position"][:, names.index("rocker.B")] *= 1.0 + 1e-14
+    for effector, said in (("", shown), ("rocker.B", ["crank.A", "coupler.P", "rocker.B"])):
+        data.attrs["end_effector_point"] = effector
+        table = next(table for table in kinematics_tables(data) if table.title == "Points")
+        assert list(table.columns[0].cells) == said
+        assert {names[k] for k in moving_points(as_runs(data))} == set(said)
+
+
 @pytest.mark.parametrize(
     ("words", "message"),
     [
         (["torques", "FILE", "--drive", "O"], r"body\.crank\.mass: is missing"),
         (["statics", "FILE"], r"error: .*rocker\.toml: body\.crank\.mass: is missing"),
-        (["run", "FILE", "--duration", "1"], r"body\.crank\.mass: is missing"),
+        (["run", "FILE"], r"rocker\.toml: body\.crank\.mass: is missing"),
+        (["kinematics", "LOOSE"], r"loose\.toml: assembly\.NAME: the mechanism has none; add an \[assembly\.NAME\] ta"),
         (["kinematics", "FILE"], "--drive: is missing; name the joint that drives the mechanism: O, A, B, Q"),
         (
             ["kinematics", "FILE", "--drive", "O", "--from", "1 kg"],
@@ -879,7 +905,10 @@ def test_paths_of_points_mark_cusps_and_crunodes(rocker):
     ],
 )
 def test_wrong_requests_are_answered_in_one_line(rocker, tmp_path, words, message):
-    words = [{"FILE": str(rocker), "FOLDER": str(tmp_path)}.get(word, word) for word in words]
+    loose = tmp_path / "loose.toml"
+    loose.write_text(ROCKER.partition("[assembly")[0])
+    files = {"FILE": str(rocker), "FOLDER": str(tmp_path), "LOOSE": str(loose)}
+    words = [files.get(word, word) for word in words]
     done = paraflex(*words, "--out", tmp_path / "out")
     assert done.returncode == 2, done.stdout
     (line,) = done.stderr.strip().splitlines()
