@@ -16,6 +16,8 @@ from paraflex.figures.kinematics import kinematics_of, kinematics_tables
 from paraflex.figures.run_motion import moving_points, point_paths
 from paraflex.figures.selection import as_runs
 from paraflex.formatting import output_units
+from paraflex.plots import save_figures
+from paraflex.reports import motion_page
 from paraflex.results.kinematics import add_kinematics
 from shell import paraflex
 
@@ -389,6 +391,23 @@ def driven_by(mechanism, **profiles):
     """Return a mechanism with prescribed motions of joints, by functions of time and their two derivatives."""
     laws = tuple(pf.PrescribedAngle(joint, joint, pf.SampledAngle(*three)) for joint, three in profiles.items())
     return replace(mechanism, prescribed=laws)
+
+
+def over_of(motion):
+    return kinematics_of(pf.motion_dataset(motion))["over"]
+
+
+def test_curves_are_drawn_over_the_only_drive_unless_it_reverses(tmp_path):
+    crank = four_bar(0.4, 0.1, 0.35, 0.25)
+    speeds_up = (lambda t: 1.0 + t**2 + t, lambda t: 2.0 * t + 1.0, lambda t: 2.0 + 0.0 * t)
+    motion = pf.kinematics(driven_by(crank, O=speeds_up), duration=2.0, samples=11)
+    assert (over_of(motion), over_of(pf.kinematics(driven_by(crank, O=SWING), duration=6.0, samples=11))) == ("O", "")
+    assert over_of(pf.kinematics(crank, "O", samples=5)) == "O"
+    assert over_of(pf.kinematics(pf.load("five_bar"), samples=5)) == ""
+    data = pf.motion_dataset(motion)
+    save_figures(data, tmp_path)
+    assert "angle of $O$" in (tmp_path / "joint_motions.svg").read_text(encoding="utf-8")
+    assert motion_page(data).over == "O"
 
 
 SWING = (lambda t: 1.0 + 0.5 * np.sin(t), lambda t: 0.5 * np.cos(t), lambda t: -0.5 * np.sin(t))
