@@ -12,9 +12,14 @@ import scipy
 
 import paraflex as pf
 from paraflex.errors import InputError, UnreachablePathError
-from paraflex.figures.run_motion import point_paths
+from paraflex.figures.kinematics import kinematics_of, kinematics_tables
+from paraflex.figures.run_motion import moving_points, point_paths
 from paraflex.figures.selection import as_runs
+from paraflex.formatting import output_units
+from paraflex.plots import save_figures
+from paraflex.reports import motion_page
 from paraflex.reports.loads import load_tiles
+from paraflex.results.kinematics import add_kinematics
 from paraflex.results.loads import joint_line, load_figures
 from shell import paraflex
 
@@ -275,6 +280,7 @@ def test_a_point_at_the_instant_centre_has_a_cusp_there():
 def test_all_assemblies_of_a_four_bar_are_the_two_mirrored_in_its_diagonal():
     found = pf.kinematics(four_bar(0.4, 0.1, 0.35, 0.25), "O", start=1.0).assemblies()
     assert len(found) == 2
+    assert all(-math.pi <= angle < math.pi for angle in found[1].angles.values())
     A = 0.1 * np.array([math.cos(1.0), math.sin(1.0)])
     diagonal = math.atan2(-A[1], 0.4 - A[0])
     both = sum(one.angles["coupler"] for one in found) - 2 * diagonal
@@ -313,7 +319,7 @@ def test_a_flywheel_absorbs_the_fluctuation_of_a_slider_crank():
         with pytest.raises(InputError, match="fluctuation: not between 0 and 1"):
             pf.flywheel(motion, wrong)
     with pytest.raises(InputError, match="the motion has no loads"):
-        pf.flywheel(pf.kinematics(pf.load("four_bar")), 0.05)
+        pf.flywheel(pf.kinematics(pf.load("four_bar"), "O"), 0.05)
     with pytest.raises(InputError, match="whole turn"):
         pf.flywheel(pf.torques(pf.load("four_bar"), "O", start=0.0, end=1.0), 0.05)
 
@@ -389,6 +395,23 @@ def driven_by(mechanism, **profiles):
     return replace(mechanism, prescribed=laws)
 
 
+def over_of(motion):
+    return kinematics_of(pf.motion_dataset(motion))["over"]
+
+
+def test_curves_are_drawn_over_the_only_drive_unless_it_reverses(tmp_path):
+    crank = four_bar(0.4, 0.1, 0.35, 0.25)
+    speeds_up = (lambda t: 1.0 + t**2 + t, lambda t: 2.0 * t + 1.0, lambda t: 2.0 + 0.0 * t)
+    motion = pf.kinematics(driven_by(crank, O=speeds_up), duration=2.0, samples=11)
+    assert (over_of(motion), over_of(pf.kinematics(driven_by(crank, O=SWING), duration=6.0, samples=11))) == ("O", "")
+    assert over_of(pf.kinematics(crank, "O", samples=5)) == "O"
+    assert over_of(pf.kinematics(pf.load("five_bar"), samples=5)) == ""
+    data = pf.motion_dataset(motion)
+    save_figures(data, tmp_path)
+    assert "angle of $O$" in (tmp_path / "joint_motions.svg").read_text(encoding="utf-8")
+    assert motion_page(data).over == "O"
+
+
 SWING = (lambda t: 1.0 + 0.5 * np.sin(t), lambda t: 0.5 * np.cos(t), lambda t: -0.5 * np.sin(t))
 
 
@@ -428,7 +451,7 @@ def test_a_named_drive_leaves_the_prescribed_motions_of_other_freedoms():
 def test_a_flywheel_needs_enough_samples_and_a_torque_that_repeats():
     model = pf.load("four_bar")
     with pytest.raises(InputError, match="samples: too few samples for a flywheel"):
-        pf.flywheel(pf.torques(model, samples=5), 0.05)
+        pf.flywheel(pf.torques(model, "O", samples=5), 0.05)
     sine = pf.SampledAngle(
         lambda t: np.sin(3.3 * t), lambda t: 3.3 * np.cos(3.3 * t), lambda t: -10.89 * np.sin(3.3 * t)
     )
@@ -489,8 +512,17 @@ def test_a_crossed_parallelogram_stays_crossed():
 
 def test_a_motion_from_an_assembly_at_a_change_point_is_refused():
     folded = pf.Assembly("folded", {"crank": math.pi, "coupler": 0.0, "rocker": math.pi})
-    with pytest.raises(UnreachablePathError, match=r"change point or a limit of reach near O at 3\.14159 rad"):
+    says = (
+        r"^the assembly is at a change point, O at 180 deg, where others meet it; .* another position, 1\.00 deg away"
+    )
+    with output_units(["deg"]), pytest.raises(UnreachablePathError, match=says):
         pf.kinematics(replace(PARALLELOGRAM, assemblies=(folded,)), "O")
+    # Rounding is not shown, and as far away the motion may start there.
+    flat = pf.Assembly("flat", {"crank": -1e-25, "coupler": 0.0, "rocker": 0.0})
+    with pytest.raises(UnreachablePathError, match="change point, O at 0 rad, where"):
+        pf.kinematics(replace(PARALLELOGRAM, assemblies=(flat,)), "O", start=0.5)
+    away = pf.Assembly("away", {"crank": math.radians(1), "coupler": 0.0, "rocker": math.radians(1)})
+    assert len(pf.kinematics(replace(PARALLELOGRAM, assemblies=(away,)), "O", start=0.0, samples=5).passed) == 3
 
 
 def angles_of(motion):
@@ -724,6 +756,17 @@ def test_a_duration_gives_the_end_of_a_drive():
     assert motion.solution.t[-1] == pytest.approx(0.25, abs=1e-15)
 
 
+def test_a_prescribed_speed_lasts_as_long_as_the_study():
+    model = pf.load("four_bar")
+    assert (model.study.duration, pf.kinematics(model, samples=3).solution.t[-1]) == (0.7, pytest.approx(0.7))
+    assert pf.kinematics(model, duration=0.2, samples=3).drive.duration == pytest.approx(0.2)
+    for turns_once in (pf.kinematics(model, "O", samples=3), pf.kinematics(model, speed=7.0, samples=3),
+                       pf.kinematics(model.mechanism, samples=3)):  # fmt: skip
+        assert turns_once.drive.full_turn
+    with pytest.raises(InputError, match=r"duration: more than 20 turns \(got 9\.0\); give less, or name the drive"):
+        pf.kinematics(replace(model, study=replace(model.study, duration=9.0)))
+
+
 def test_an_assembly_that_had_to_be_moved_is_reported():
     angles = {"crank": math.radians(200), "coupler": 0.4, "rocker": math.radians(100)}
     moved = replace(four_bar(0.4, 0.1, 0.35, 0.25), assemblies=(pf.Assembly("open", angles),))
@@ -735,6 +778,11 @@ def test_an_assembly_that_had_to_be_moved_is_reported():
     (one,) = pf.kinematics(beyond, "Q", end=1.8).findings
     assert one.code == "assembly-moved"
     assert "do not close with Q at 1.22173 rad as given" in one.text
+    # A start within reach is taken, and one that is not is told the limits.
+    assert pf.kinematics(beyond, "Q", start=2.0, end=1.8, samples=3).drive.start == 2.0
+    says = r"start: not between the limits of reach of Q, 1\.67096 rad and 2\.49809 rad \(got 3\.0\); give one between"
+    with pytest.raises(InputError, match=says):
+        pf.kinematics(beyond, "Q", start=3.0, end=1.8)
 
 
 def test_drives_are_named_as_the_user_does():
@@ -834,12 +882,35 @@ def test_paths_of_points_mark_cusps_and_crunodes(rocker):
     assert "crunode" not in {curve.name for curve in only.curves}
 
 
+def test_tables_show_no_rounding_and_name_points_as_figures_do(rocker):
+    motion = pf.kinematics(pf.load(rocker), "O", start=1.0)
+    data = pf.motion_dataset(motion)
+    add_kinematics(data, motion, assemblies=True)
+    found = kinematics_of(data)
+    found["trails"]["coupler.P"]["crunodes"][0]["position"] = [0.1, -7e-18]
+    found["assemblies"][0]["angles"]["rocker"] = 8e-17
+    data.attrs["kinematics"] = json.dumps(found)
+    tables = {table.title: table for table in kinematics_tables(data)}
+    assert tables["Special points of coupler curves"].texts()[0][2:4] == ["100", "0"]
+    assert tables["Assemblies"].texts()[0][3] == "0"
+    # Of coincident points the first is shown, whichever travels farther by rounding, or else the end-effector.
+    names = [str(name) for name in data["point"].values]
+    shown = ["crank.A", "coupler.B", "coupler.P"]
+    data["point_position"][:, names.index("rocker.B")] *= 1.0 + 1e-14
+    for effector, said in (("", shown), ("rocker.B", ["crank.A", "coupler.P", "rocker.B"])):
+        data.attrs["end_effector_point"] = effector
+        table = next(table for table in kinematics_tables(data) if table.title == "Points")
+        assert list(table.columns[0].cells) == said
+        assert {names[k] for k in moving_points(as_runs(data))} == set(said)
+
+
 @pytest.mark.parametrize(
     ("words", "message"),
     [
         (["torques", "FILE", "--drive", "O"], r"body\.crank\.mass: is missing"),
         (["statics", "FILE"], r"error: .*rocker\.toml: body\.crank\.mass: is missing"),
-        (["run", "FILE", "--duration", "1"], r"body\.crank\.mass: is missing"),
+        (["run", "FILE"], r"rocker\.toml: body\.crank\.mass: is missing"),
+        (["kinematics", "LOOSE"], r"loose\.toml: assembly\.NAME: the mechanism has none; add an \[assembly\.NAME\] ta"),
         (["kinematics", "FILE"], "--drive: is missing; name the joint that drives the mechanism: O, A, B, Q"),
         (
             ["kinematics", "FILE", "--drive", "O", "--from", "1 kg"],
@@ -888,7 +959,10 @@ def test_paths_of_points_mark_cusps_and_crunodes(rocker):
     ],
 )
 def test_wrong_requests_are_answered_in_one_line(rocker, tmp_path, words, message):
-    words = [{"FILE": str(rocker), "FOLDER": str(tmp_path)}.get(word, word) for word in words]
+    loose = tmp_path / "loose.toml"
+    loose.write_text(ROCKER.partition("[assembly")[0])
+    files = {"FILE": str(rocker), "FOLDER": str(tmp_path), "LOOSE": str(loose)}
+    words = [files.get(word, word) for word in words]
     done = paraflex(*words, "--out", tmp_path / "out")
     assert done.returncode == 2, done.stdout
     (line,) = done.stderr.strip().splitlines()

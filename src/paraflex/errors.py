@@ -182,18 +182,18 @@ class Moment:
     ----------
     time : float
         Time [s].
-    step : int
-        Number of accepted steps (or path samples) until then.
+    step : int, optional
+        Number of accepted steps (or path samples) until then; None where there are none.
     position : tuple of float, optional
         Position of the end-effector in the ground frame [m]; None if unknown.
     """
 
     time: float
-    step: int
+    step: int | None = None
     position: tuple[float, ...] | None = None
 
     def __str__(self) -> str:
-        text = f"t = {self.time:.6g} s (step {self.step})"
+        text = f"t = {self.time:.6g} s" + (f" (step {self.step})" if self.step is not None else "")
         if self.position is not None:
             text += ", end-effector at (" + ", ".join(f"{x:.4g}" for x in self.position) + ") m"
         return text

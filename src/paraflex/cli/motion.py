@@ -23,6 +23,7 @@ from paraflex.folders import RUN
 from paraflex.formatting import number, output_unit, quantity
 from paraflex.integrators import IntegrationOptions
 from paraflex.mechanism import Mechanism
+from paraflex.mechanism.masses import check_masses
 from paraflex.motion import MotionRun, state_at
 from paraflex.reduced_bodies import AUTO, reduced_mechanism, size_of
 from paraflex.results import motion_dataset, motion_summary
@@ -51,6 +52,8 @@ _ROUNDING = 1e-12
 
 def run_motion(request: RunRequest, model: Model, mechanism: Mechanism, options: IntegrationOptions) -> int:
     """Run a mechanism's own motion and write results; return the exit code."""
+    with locating_errors(model):
+        check_masses(mechanism)
     study = own_motion(model, request.plan)
     if request.modes:
         raise InputError(

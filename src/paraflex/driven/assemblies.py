@@ -55,6 +55,7 @@ def assemblies_of(motion: ExactMotion, starts: int = _STARTS) -> list[FoundAssem
                 counts[k] += 1
                 break
         else:
+            q[angles] = (q[angles] + np.pi) % (2.0 * np.pi) - np.pi
             poses.append(q)
             counts.append(1)
     return [

@@ -66,7 +66,7 @@ def flywheel(motion: DrivenMotion, fluctuation: float) -> Flywheel:
     if drive is None or not drive.full_turn:
         raise InputError(
             "a flywheel needs a drive that makes a whole turn", field="fluctuation", value=fluctuation,
-            remedy="leave it out, or drive a joint that turns without limits",
+            remedy="name a drive that turns without limits, and no duration",
         )  # fmt: skip
     torque = drive_torques(motion.system, motion.solution.multipliers)[:, 0]
     if np.isnan(torque).any():

@@ -3,6 +3,7 @@
 import math
 import time
 from collections.abc import Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any, ClassVar
@@ -17,6 +18,7 @@ from paraflex.dynamics.joint_coordinates import joint_value, value_text
 from paraflex.dynamics.load_values import check_laws
 from paraflex.errors import AssemblyError, InputError, ParaflexError, UnreachablePathError
 from paraflex.findings import Finding
+from paraflex.formatting import quantity
 from paraflex.integrators import Solution, check_times
 from paraflex.integrators.between import samples_too_few, with_between
 from paraflex.integrators.solution import LateFindings
@@ -176,7 +178,8 @@ def kinematics(
         Speed of the drive [rad/s, m/s]; by default that of the prescribed motion at its joint, else 1.
     duration : float, optional
         Duration [s]: of the drive in place of its end, else of prescribed motions, by default that of the model's
-        study, or of the motion along a path, by default the path's.
+        study (without one, a single motion of constant speed makes a turn), or of the motion along a path, by default
+        the path's.
     samples : int
         Number of samples, evenly spaced, both ends included.
     assembly : str, optional
@@ -214,13 +217,14 @@ def kinematics(
         follow = path_follower(moved, way, last, assembly=chosen, orientation=orientation)
         rigid = follow(np.linspace(0.0, last, samples))
         return _motion(moved, (rigid.t, rigid.q, rigid.v, rigid.a), began, None, follow.closure, rigid=rigid, path=name)
+    if duration is None and drive is None and not wish.of_drive and moved.prescribed:
+        duration = getattr(getattr(mechanism, "study", None), "duration", None)
+        wish = wish._replace(duration=duration)
     system = build_system(replace(moved, prescribed=()))
     near = reference_pose(system, chosen)
     law = chosen_drive(moved, wish, freedoms, system, near)
     if law is None:
         check_determined(moved, freedoms)
-        if duration is None:
-            duration = getattr(getattr(mechanism, "study", None), "duration", None)
         if duration is None:
             raise InputError("is missing", field="duration", remedy="give it in seconds, or name a drive")
         check_times(duration, None)
@@ -253,15 +257,27 @@ def _ranged(
     except UnreachablePathError:
         raise
     except AssemblyError as error:
-        if wish.start is not None or law.held:
-            field, value = ("held", ", ".join(law.held)) if wish.start is None else ("start", wish.start)
-            remedy = "give one within reach of the assembly"
-            raise InputError(error.cause.rstrip(","), field=field, value=value, remedy=remedy) from error
+        refused = error
     # The assembly's angle of the drive is approximate: another joint's may be nearer.
     again = chosen_drive(mechanism, wish, freedoms, system, closed)
     assert again is not None
-    found = ranged(mechanism, again, closed, freedoms, system, fixed=fixed)
-    return *found, f"at {value_text(system, law.joint, closed)}"
+    try:
+        found = ranged(mechanism, again, closed, freedoms, system, fixed=fixed)
+    except AssemblyError as error:
+        if wish.start is None and not law.held:
+            raise
+        field, value = ("held", ", ".join(law.held)) if wish.start is None else ("start", wish.start)
+        problem, remedy = refused.cause.rstrip(","), "give one within reach of the assembly"
+        with suppress(InputError, AssemblyError):
+            free = chosen_drive(mechanism, wish._replace(start=None, end=None, duration=None), freedoms, system, closed)
+            assert free is not None
+            reach = ranged(mechanism, free, closed, freedoms, system, fixed=False)[2].reach
+            low, high = (quantity(end or 0.0, law.unit, digits=6) for end in reach)
+            if field == "start" and None not in reach:
+                problem = f"not between the limits of reach of {law.joint}, {low} and {high}"
+                remedy = "give one between them"
+        raise InputError(problem, field=field, value=value, remedy=remedy) from error
+    return *found, "" if wish.start is not None else f"at {value_text(system, law.joint, closed)}"
 
 
 def _path(

@@ -32,6 +32,8 @@ _MOST_TURNS = 20.0
 _STEP = 1.0 / 360.0
 # Smallest singular value of the constraints, relative to the largest, at which a motion ends beside a change point.
 _NEAR = 1e-2
+# Distance from the first pose within which a motion stops there [sizes of the mechanism, rad].
+_AT_FIRST = 1e-6
 _GIVE_RANGE = "give the start and end of its travel"
 
 
@@ -121,7 +123,9 @@ def chosen_drive(mechanism: Mechanism, wish: Wish, freedoms: int, system: System
     if found.turns > _MOST_TURNS or max(abs(start), abs(last)) > _MOST_TURNS * max(turn, 2.0 * math.pi):
         field = "duration" if wish.duration is not None else "start" if wish.end is None else "end"
         example = {"rad": "90 deg", "m": "50 mm"}[unit]
-        remedy = f'in another unit? It is in {unit}, or write "{example}"' if field != "duration" else "give less"
+        remedy = f'in another unit? It is in {unit}, or write "{example}"'
+        if field == "duration":
+            remedy = "give less" if wish.drive else "give less, or name the drive, which turns once"
         raise InputError(
             f"more than {_MOST_TURNS:g} turns" if unit == "rad" else "too far", field=field,
             value=getattr(wish, field), remedy=remedy,
@@ -223,7 +227,7 @@ def ranged(
         stopped = _reached(there, way, first)
         limit = None if stopped is None else limit_of_reach(there.system, law.joint, stopped)
         if limit is None:
-            raise _barred(way, there, stopped, None)
+            raise _barred(way, there, stopped, None, first)
         ends.append(limit)
     low, high = sorted(ends)
     reach, inside = (low, high), _MARGIN * (high - low)
@@ -290,7 +294,7 @@ def followed(
     beside = width_beside(law, float(times[-1]), loops.mechanism)
     found, passed = follow_past(loops, no_target, grid, keep, first, beside)
     if not found.closed:
-        raise _barred(law, loops, found.last, found.stopped)
+        raise _barred(law, loops, found.last, found.stopped, first)
     if law is not None and _folded(loops, found.last):
         # Accelerations at the end are rounding errors, unless the motion beyond a change point tells them.
         beyond = np.append(grid, grid[-1] + 2.0 * beside), np.append(keep, False)
@@ -300,7 +304,9 @@ def followed(
     return found.arrays[:4], tuple(passed)
 
 
-def _barred(law: Drive | None, loops: LoopClosure, last: Array | None, stopped: float | None) -> UnreachablePathError:
+def _barred(
+    law: Drive | None, loops: LoopClosure, last: Array | None, stopped: float | None, first: FirstPose
+) -> UnreachablePathError:
     """Return the error of a motion that stops at a limit of reach or a change point."""
     system = loops.system
     q = last if last is not None else np.zeros(system.n)
@@ -308,9 +314,11 @@ def _barred(law: Drive | None, loops: LoopClosure, last: Array | None, stopped: 
     limit = limit_of_reach(system, law.joint, q) if law is not None and law.alone and last is not None else None
     if limit is not None and law is not None:
         cause = f"{law.joint} reaches its limit of reach, {quantity(limit, law.unit, digits=6)},"
+    elif first.rates is None and last is not None and np.max(np.abs((last - first.q) / system.units)) < _AT_FIRST:
+        beside = "" if law is None else quantity(2.0 * law.speed * width_beside(law, law.duration), law.unit)
+        remedy = f"give the assembly in another position{f', {beside} away' * bool(beside)}; the motion may start here"
+        return UnreachablePathError(f"the assembly is at a change point, {drives}, where others meet it", remedy=remedy)
     else:
         cause = f"the motion passes a change point or a limit of reach near {drives},"
-    at = stopped if stopped is not None else 0.0
-    return UnreachablePathError(
-        cause, Moment(at, 0), None, "give a range on one side of it, or drive another joint"
-    )  # fmt: skip
+    at = Moment(stopped if stopped is not None else 0.0)
+    return UnreachablePathError(cause, at, remedy="give a range on one side of it, or drive another joint")

@@ -7,6 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from paraflex.arrays import Array, Indices
+from paraflex.formatting import ROUNDING, output_unit, quantity
 from paraflex.mechanism import Joint, PointRef
 from .coordinates import GROUND_INDEX, Marker
 from .points import cross, marker_place, marker_position
@@ -71,7 +72,8 @@ def joint_rows(system: System, names: Sequence[str], q: Array) -> Array:
 
 def value_text(system: System, name: str, q: Array) -> str:
     """Format the coordinate of a joint at q (n,), with its unit."""
-    return f"{joint_value(system, name, q):.6g} {'m' if system.mechanism.slides(name) else 'rad'}"
+    value, unit = joint_value(system, name, q), "m" if system.mechanism.slides(name) else "rad"
+    return quantity(value if abs(value) > ROUNDING else 0.0, unit, output_unit(unit), digits=6, padded=False)
 
 
 def place_along_beam(system: System, name: str, q: Array) -> Array:

@@ -2,7 +2,7 @@
 
 import json
 import math
-from collections.abc import Container, Iterator, Mapping
+from collections.abc import Container, Iterable, Iterator, Mapping
 from typing import Any
 
 import numpy as np
@@ -11,7 +11,7 @@ import xarray as xr
 from paraflex.arrays import Array
 from paraflex.formatting import display_unit, number, quantity, text_symbol
 from paraflex.results.kinematics import KINEMATICS
-from .selection import names_of
+from .selection import apart, names_of
 from .tables import Table, table_of
 
 # Largest number of points that are listed.
@@ -104,15 +104,20 @@ def _joints(data: xr.Dataset, found: Found, title: str, unit: str) -> Table:
     places = data["time"].values if drive is None else coordinates.sel(joint=drive["joint"]).values
     for joint in names_of(data, "joint"):
         values = coordinates.sel(joint=joint).values
-        values = np.where(np.abs(values) < _SAME * np.ptp(values), 0.0, values)
         if found["joint_units"].get(joint) != unit or not np.ptp(values) > _SAME * size:
             continue
         ends = [(float(values[k]), float(places[k])) for k in (int(np.argmin(values)), int(np.argmax(values)))]
         ends += [(end["value"], end[key]) for end in found["dead_points"].get(joint, ())]
-        ends = [(0.0 if abs(value) < _SAME * np.ptp(values) else value, place) for value, place in ends]
+        ends = [*zip(_rounded((value for value, _ in ends), np.ptp(values)),
+                     _rounded((place for _, place in ends), np.ptp(places)), strict=True)]  # fmt: skip
         rows.append((joint, *min(ends), *max(ends), found["time_ratios"].get(joint)))
     heads = [("joint", ""), ("lowest", unit), at, ("highest", unit), at, ("time ratio", "")]
     return table_of(title, heads, rows, alike=("lowest", "highest"))
+
+
+def _rounded(values: Iterable[float], size: float) -> list[float]:
+    """Return values without rounding errors: zero for those that are very small beside a size."""
+    return [0.0 if abs(value) < _SAME * size else value for value in values]
 
 
 def _dead_points(found: Found) -> Table:
@@ -136,20 +141,18 @@ def _transmissions(found: Found) -> Table:
 
 def _points(data: xr.Dataset) -> Table:
     """Return the table of the points that move, one of those that coincide: range, largest speed and acceleration."""
-    rows, seen = [], []
+    rows, names, effector = [], names_of(data, "point"), data.attrs.get("end_effector_point")
     position = data["point_position"].transpose("time", "point", "axis").values
-    least = _SAME * float(np.max(np.ptp(position, axis=0), initial=0.0))
-    for k, point in enumerate(names_of(data, "point")):
-        places = position[:, k]
-        repeated = any(np.allclose(places, other, rtol=0.0, atol=least) for other in seen)
-        if np.max(np.ptp(places, axis=0)) > least and not repeated and len(rows) < _MOST_POINTS:
-            one = data.sel(point=point)
-            most = [float(np.max(np.linalg.norm(one[f"point_{name}"].transpose("time", "axis").values, axis=1)))
-                    for name in ("velocity", "acceleration")]  # fmt: skip
-            ends = np.stack([places.min(axis=0), places.max(axis=0)], axis=1)
-            ends[np.abs(ends) < least] = 0.0
-            rows.append((point, *ends.ravel().tolist(), *most))
-            seen.append(places)
+    size = float(np.max(np.ptp(position, axis=0), initial=0.0))
+    least = _SAME * size
+    moving = [k for k in range(len(names)) if np.max(np.ptp(position[:, k], axis=0)) > least]
+    shown = apart(position, sorted(moving, key=lambda k: names[k] != effector), least)
+    for k in sorted(shown)[:_MOST_POINTS]:
+        places, one = position[:, k], data.isel(point=k)
+        most = [float(np.max(np.linalg.norm(one[f"point_{name}"].transpose("time", "axis").values, axis=1)))
+                for name in ("velocity", "acceleration")]  # fmt: skip
+        ends = np.stack([places.min(axis=0), places.max(axis=0)], axis=1).ravel().tolist()
+        rows.append((names[k], *_rounded(ends, size), *most))
     heads = [("point", ""), ("x from", "m"), ("x to", "m"), ("y from", "m"), ("y to", "m"), ("top speed", "m/s"),
              ("top acceleration", "m/s^2")]  # fmt: skip
     note = "Ranges, and the largest speed and acceleration, at the samples."
@@ -160,8 +163,10 @@ def _points(data: xr.Dataset) -> Table:
 def _special(found: Found) -> Table:
     """Return the table of cusps and crunodes of coupler curves."""
     key, at = _place(found)
+    places = [each["position"] for trail in found["trails"].values() for kind in trail.values() for each in kind]
+    size = float(np.max(np.abs(places), initial=0.0))
     rows = [
-        (point, kind, *each["position"], *((each[key], None) if kind == "cusp" else each[f"{key}s"]))
+        (point, kind, *_rounded(each["position"], size), *((each[key], None) if kind == "cusp" else each[f"{key}s"]))
         for point, trail in found["trails"].items() for kind in ("cusp", "crunode") for each in trail[f"{kind}s"]
     ]  # fmt: skip
     heads = [("point", ""), ("kind", ""), ("x", "m"), ("y", "m"), at, ("and at", at[1])]
@@ -171,7 +176,8 @@ def _special(found: Found) -> Table:
 def _assemblies(found: Found) -> Table:
     """Return the table of the assemblies that were searched for: angles of all bodies at the start."""
     assemblies = found.get("assemblies", [])
-    rows = [(k, *one["angles"].values(), one["found"]) for k, one in enumerate(assemblies, start=1)]
+    rows = [(k, *_rounded(one["angles"].values(), 2.0 * np.pi), one["found"])
+            for k, one in enumerate(assemblies, start=1)]  # fmt: skip
     bodies = [(body, "rad") for one in assemblies[:1] for body in one["angles"]]
     note = "With the drive at its start, that of the motion first; found: random starts that led to it."
     return table_of("Assemblies", [("assembly", ""), *bodies, ("found", "")], rows, note)

@@ -14,7 +14,7 @@ from .charts import DOTTED, Axis, Chart, Curve, Look, look
 from .entry import figure
 from .kinematics import special_points
 from .runs import compared, followed, of_names, ranges, run_names, stopped_runs
-from .selection import names_of, place_of, point_number
+from .selection import apart, names_of, place_of, point_number
 
 ANGLE = Axis("angle", "rad", "φ")
 ANGLES = Chart("angles", "Angles", ANGLE, choosing="link")
@@ -328,14 +328,12 @@ def moving_points(data: xr.Dataset, most: int = _MOST_POINTS) -> list[int]:
     travel = ranges(places).max(axis=1)
     # Coincident points share a line, named after the end-effector if it is one of them. Names of generated points
     # contain "._".
-    effector = data.attrs.get("end_effector_point")
-    shown: list[int] = []
-    for k in sorted(range(len(names)), key=lambda k: (names[k] != effector, -travel[k])):
-        apart = all(peak(places[:, k] - places[:, other]) > _STILL_SHARE * travel.max() for other in shown)
-        if travel[k] > _STILL_SHARE * travel.max() and apart and "._" not in names[k]:
-            shown.append(int(k))
+    effector, least = data.attrs.get("end_effector_point"), _STILL_SHARE * travel.max(initial=0.0)
+    moving = [k for k, name in enumerate(names) if "._" not in name and travel[k] > least]
+    shown = apart(places, sorted(moving, key=lambda k: names[k] != effector), least)
     first = [k for k in shown if names[k] == effector]
-    return first + sorted(k for k in shown[:most] if k not in first)
+    farthest = sorted((k for k in shown if k not in first), key=lambda k: -travel[k])
+    return first + sorted(farthest[: most - len(first)])
 
 
 # Magnitudes of runs, for tables and tiles

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from paraflex.arrays import Array
 from paraflex.errors import InputError
-from paraflex.formatting import is_signs
+from paraflex.formatting import is_signs, peak
 
 if TYPE_CHECKING:
     import xarray as xr
@@ -100,6 +100,15 @@ def of_point(run: xr.Dataset, point: str | None) -> xr.Dataset:
     parts = {"": "position", "_velocity": "velocity", "_acceleration": "acceleration"}
     moved = {f"end_effector{part}": run[f"point_{name}"].isel(point=k, drop=True) for part, name in parts.items()}
     return run.drop_vars([f"{name}_desired" for name in moved if f"{name}_desired" in run]).assign(moved)
+
+
+def apart(places: Array, points: Iterable[int], least: float) -> list[int]:
+    """Return the first of all points that coincide, at places (samples, points, 2), to a distance."""
+    found: list[int] = []
+    for k in points:
+        if all(peak(places[:, k] - places[:, other]) > least for other in found):
+            found.append(k)
+    return found
 
 
 def samples(run: xr.Dataset) -> int:

@@ -260,5 +260,6 @@ class Members(CheckedFields):
                 return assembly
         if not names:
             remedy = "add an [assembly.NAME] table with estimates of coordinates"
-            raise InputError("the mechanism has none", field="assembly", value=name, remedy=remedy)
+            field = "assembly" if name else "assembly.NAME"
+            raise InputError("the mechanism has none", field=field, value=name, remedy=remedy)
         raise InputError("unknown assembly", field="assembly", value=name, remedy=f"this mechanism has: {names}")

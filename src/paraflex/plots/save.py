@@ -75,13 +75,13 @@ def _accompanying(
     if not kind:
         raise InputError("not the numbers of a result", field="results", remedy="give what its to_dict() returns")
     source = Source(kind, results, folder)
-    drive = kinematics_of(results).get("drive") if isinstance(results, xr.Dataset) else None
+    joint = kinematics_of(results).get("over") if isinstance(results, xr.Dataset) else None
     drawn = []
     for figure in figures_of(source, written=True):
         named, one_of_many = replace(figure, name=figure.written_as), figure.takes in ("models", "run")
         modes = [mode] if mode is not None and figure.takes == "mode" else ()
         # A mechanism with a drive is shown over its angle or travel, as designers know it.
-        over = drive["joint"] if drive is not None and figure.is_over_time(results) else TIME.name
+        over = joint if joint and figure.is_over_time(results) else TIME.name
         for drawing in drawings(source, figure, modes, over=over):
             drawn.append(replace(drawing, figure=named, of=drawing.of if one_of_many else ""))
     return drawn

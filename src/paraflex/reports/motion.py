@@ -35,10 +35,10 @@ def motion_page(data: xr.Dataset) -> Page:
     found = kinematics_of(data)
     # Without masses there are no forces.
     forceless = found and loads[""]["frame"]["force_max"] is None
-    drive = found["drive"]["joint"] if found.get("drive") else ""
+    joint = found.get("over", "")
     return replace(
         page,
-        over=drive if any(one.name == drive for one in page.abscissae) else "",
+        over=joint if any(one.name == joint for one in page.abscissae) else "",
         kind="kinematics" if found else "run",
         subtitle=_subtitle(data),
         facts=common_facts(data),

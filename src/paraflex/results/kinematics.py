@@ -33,6 +33,7 @@ def add_kinematics(
     joints = motion.system.mechanism.joints
     found: dict[str, Any] = {
         "drive": None if motion.drive is None else asdict(motion.drive) | {"full_turn": motion.drive.full_turn},
+        "over": _place(data, motion),
         "path": motion.path,
         "mode": motion.mode,
         "joint_units": {one.name: "m" if one.slides else "rad" for one in joints},
@@ -47,3 +48,14 @@ def add_kinematics(
         data.attrs[RIGID_TORQUES] = "true"
     # The motion is exact to rounding.
     data.attrs.pop("tolerance", None)
+
+
+def _place(data: xr.Dataset, motion: "DrivenMotion") -> str:
+    """Return the joint over whose coordinate curves are drawn: the only drive, if it does not reverse; or none."""
+    if motion.drive is not None:
+        return motion.drive.joint
+    prescribed = motion.system.mechanism.prescribed
+    if motion.rigid is not None or len(prescribed) != 1:
+        return ""
+    steps = np.diff(data["joint_coordinate"].sel(joint=prescribed[0].joint).values)
+    return prescribed[0].joint if np.all(steps > 0.0) or np.all(steps < 0.0) else ""

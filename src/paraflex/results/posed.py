@@ -132,7 +132,7 @@ def _assembled(mechanism: Mechanism, assembly: str | None, path: tuple[str, Path
     """Return the pose of an assembly, at the start of a path if there is one."""
     if not mechanism.assemblies:
         raise InputError(
-            "no assembly: the poses of the bodies are unknown", field="assembly",
+            "no assembly: the poses of the bodies are unknown", field="assembly" if assembly else "assembly.NAME",
             remedy="add an [assembly.NAME] table with an approximate angle of each body, in rad",
         )  # fmt: skip
     chosen = mechanism.assembly(assembly)
