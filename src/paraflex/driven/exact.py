@@ -50,7 +50,7 @@ def no_target(times: Array) -> Array:
 def width_beside(drive: "Drive | None", end: float, mechanism: Mechanism | None = None) -> float:
     """Return the time before and after a change point over which a motion until `end` is interpolated [s].
 
-    Without a drive, the fastest of a mechanism's prescribed motions that turn tells the time of a turn.
+    Without a drive, the time of a turn is that of the fastest of a mechanism's prescribed motions that turn.
     """
     if drive is not None:
         return _BESIDE * (2.0 * math.pi / drive.speed if drive.unit == "rad" else end)
