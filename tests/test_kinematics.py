@@ -862,6 +862,19 @@ def test_the_commands_write_results_that_other_commands_take(rocker, tmp_path):
     assert "flywheel for a fluctuation of 0.02: 0.0754 kg m^2" in done.stdout
 
 
+@pytest.mark.parametrize("speed", [1e-9, 1e9])
+def test_a_change_point_is_passed_at_any_speed(speed):
+    motion = pf.kinematics(PARALLELOGRAM, "O", start=1.0, end=4.0, speed=speed, samples=31)
+    assert np.max(np.abs(angles_of(motion)[1])) < 1e-10
+    assert motion.passed == pytest.approx([(math.pi - 1.0) / speed], rel=1e-5)
+
+
+@pytest.mark.parametrize("first", [-math.pi / 3, -0.17, -1.0])
+def test_a_change_point_at_zero_is_shown_as_zero(first):
+    (found,) = pf.kinematics(PARALLELOGRAM, "O", start=first, end=1.0, samples=31).findings
+    assert found.text.endswith("with O at 0 rad")
+
+
 def test_loads_have_bounds_of_their_errors():
     """A share of the largest load, in which moments count by the size of the mechanism."""
     motion = pf.torques(pf.load("four_bar"), "O", speed=10.0)

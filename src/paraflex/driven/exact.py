@@ -31,7 +31,7 @@ _SAME_BRANCH = 0.05
 # Singular value of constraints that depend on others, relative to the largest, and accuracy of a change point.
 _DEPENDENT = 1e-9
 # Part of the width about a change point to which its place is shown.
-_SHARP = 1e-6
+_SHARP = 1e-5
 # Difference of poses, and of velocities as a part of the largest, after which a motion repeats.
 _REPEATED, _SAME_RATES = 1e-9, 1e-6
 # Change points that a motion may pass, and those that a finding lists.

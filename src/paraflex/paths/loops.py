@@ -103,7 +103,9 @@ class LoopClosure:
         pose : (n,) array
             Pose near the first instant.
         """
-        intervals, shortest = [], _SHORTEST_STEP * min(1.0, abs(float(grid[-1] - grid[0])) or 1.0)
+        intervals, end = [], float(np.max(np.abs(grid[[0, -1]])))
+        # Of very long motions it is a few roundings of the time.
+        shortest = max(_SHORTEST_STEP * min(1.0, abs(float(grid[-1] - grid[0])) or 1.0), 8.0 * float(np.spacing(end)))
         while True:
             status, index, found = self.run(grid, target(grid), pose)
             last = index - 1
