@@ -66,7 +66,7 @@ BROKEN = [
     ("elements = 3", "elements = 3\nmodes = 0", "body.link1.modes: no such number of modes (got 0)", "from 1 to 12"),
     ("elements = 3", "elements = 3\nmodes = 13", "body.link1.modes: no such number of modes (got 13)", "from 1 to 12"),
     ("youngs_modulus = 70e9  # Pa\n", "", "material.aluminium.youngs_modulus: is missing", "Young's modulus in Pa"),
-    ("density = 2700.0 ", "density = -2700.0 ", "body.link1.material.density: must be positive", "kg/m^3"),
+    ("density = 2700.0 ", "density = -2700.0 ", "material.aluminium.density: must be positive", "kg/m^3"),
     ("thickness = 0.005 ", "thickness = nan ", "section.bar.thickness: should be a finite number", "in m"),
     ("thickness = 0.005 ", "thickness = 0.0 ", "section.bar.thickness: must be positive (got 0.0)", "in m"),
     ("mass = 0.130 ", "mass = -0.130 ", "body.link1.lumps.A1.mass: must not be negative", "kg"),
