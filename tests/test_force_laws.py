@@ -454,6 +454,19 @@ def test_commands_name_the_file_of_a_law_that_is_not_finite(tmp_path, words):
     assert f"{file}: load.press.force: not a finite number at t = 0 s" in done.stderr
 
 
+def test_commands_name_the_file_of_a_spring_whose_law_is_not_finite(tmp_path):
+    file = tmp_path / "arm.toml"
+    file.write_text(
+        'name = "arm"\nground = { O = [0, 0] }\njoint = { O = ["ground.O", "arm.O"] }\n'
+        '[body.arm]\nmass = 1.0\ninertia = 0.01\npoints = { O = [0, 0], E = ["200 mm", 0] }\n'
+        '[spring.coil]\njoint = "O"\ntorque = "-1 / O.angle"\n'
+        "[assembly.home]\narm = 0.0\n"
+    )
+    done = paraflex("statics", file, "--load", "arm.E.y=-1", "--hold", "none")
+    assert done.returncode == 2
+    assert f"{file}: spring.coil.torque: not a finite number at t = 0 s" in done.stderr
+
+
 def test_components_over_different_quantities_have_no_file(tmp_path):
     """A table over the travel beside a law of its own, beside a table in time, and beside one over another quantity."""
     table, text = TabulatedProfile((0.0, 1.0), (0.0, 2.0)), "rail.travel"

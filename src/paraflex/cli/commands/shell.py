@@ -59,7 +59,7 @@ def _outside(request: Any) -> AbstractContextManager[None]:
 
 @contextmanager
 def _of_model(request: Any) -> Iterator[None]:
-    """Add the file of the requested model to errors of its mechanism, which does not know it; tell of a default."""
+    """Add the file of the requested model to errors of its mechanism, which does not know it; name a default."""
     try:
         yield
         if type(model := getattr(request, "model", None)) is ModelChoice and model.given is None:
@@ -72,7 +72,7 @@ def _of_model(request: Any) -> Iterator[None]:
 # Groups of commands by name, with their help.
 GROUPS = {"control": "Sampled controllers of a model."}
 # Tables of model files in the fields of errors found after a model was read.
-_TABLES = ("body.", "load.", "linear_spring.")
+_TABLES = ("body.", "load.", "linear_spring.", "spring.")
 # Requests of studies that store every run, so that they can be continued.
 _STUDIES = (studies.SweepRequest, studies.SearchRequest, studies.IndicesRequest)
 # In the order of `paraflex --help`.
