@@ -778,7 +778,7 @@ def test_an_assembly_that_had_to_be_moved_is_reported():
     (one,) = pf.kinematics(beyond, "Q", end=1.8).findings
     assert one.code == "assembly-moved"
     assert "do not close with Q at 1.22173 rad as given" in one.text
-    # A start within reach is taken, and one that is not is told the limits.
+    # A start within reach is taken, and of one that is not the limits are given.
     assert pf.kinematics(beyond, "Q", start=2.0, end=1.8, samples=3).drive.start == 2.0
     says = r"start: not between the limits of reach of Q, 1\.67096 rad and 2\.49809 rad \(got 3\.0\); give one between"
     with pytest.raises(InputError, match=says):
@@ -837,7 +837,7 @@ def test_the_commands_write_results_that_other_commands_take(rocker, tmp_path):
     page = (folder / "report.html").read_text(encoding="utf-8")
     assert "Transmission angles" in page
     assert "paraflex kinematics" in page
-    # The page tells the range, the smallest transmission angle and the time ratio, over the angle of the drive.
+    # The page begins with the range, the smallest transmission angle and the time ratio, over the angle of the drive.
     assert "smallest transmission angle" in page
     assert "Motors and prescribed motions" not in page
     data = json.loads(re.search(r'<script type="application/json" id="report-data">(.*?)</script>', page, re.DOTALL)[1])

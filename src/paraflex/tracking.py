@@ -483,13 +483,13 @@ def _follow(
     # Motors that follow the plan clamp the links; finite segments bend up to them then.
     system = task.system if task.whole is None else build_system(with_clamps(task.mechanism, joints))
     held = held_joints(system, task.start, profiles)
-    end, follow = float(task.motion.t[-1]), [motor in motors for motor in task.mechanism.motors]
-    signals, knots = pack_signals(held.system.mechanism, torques.without(follow).signals, end)
+    given = torques.without([motor in motors for motor in task.mechanism.motors])
+    signals, knots = pack_signals(held.system.mechanism, given.signals, float(task.motion.t[-1]))
     stops = np.unique(np.concatenate([path_stops(torques.knots, task.mechanism), knots]))
     own = [held.system.rows.index(row) for row in task.system.rows]
 
     def whole(solution: Solution) -> TrackingRun:
-        holding = _holding(task, motors, held, solution) + torques.without(follow).evaluate(solution.t)
+        holding = _holding(task, motors, held, solution) + given.evaluate(solution.t)
         errors = solution.multiplier_errors
         solution = replace(
             solution,

@@ -16,7 +16,7 @@ from paraflex.findings import Finding
 from paraflex.integrators import Solution
 from paraflex.kernel.bodies import stored_energy
 from paraflex.kernel.packed import make_scratch
-from .exact import AT, ExactMotion, placed, width_beside
+from .exact import AT, ExactMotion, placed
 
 # Share of the largest load within which loads agree with other programs in the tests, and limits with closed forms.
 RIGHT_TO, LIMITS_RIGHT_TO = 1e-9, 1e-6
@@ -76,14 +76,14 @@ def load_errors(system: System, multipliers: Array, share: float) -> Array:
 def with_limits(motion: ExactMotion, solution: Solution) -> tuple[Solution, Mask, list[Finding]]:
     """Return a solution with loads that has their limits at change points; rows (m,) without, and findings on them.
 
-    Where assemblies meet, the mechanism can move with its drives held. Forces have a limit if those that the motion
+    At a change point the mechanism can move with its drives held. Forces have a limit if those that the motion
     requires do no work on this free motion; otherwise they grow without bound in the rows that take part in it. The
     limit is that of the cubic polynomial through forces on both sides or, near the end of a motion, on one.
     """
-    system, drive, multipliers = motion.system, motion.drive, solution.multipliers.copy()
+    system, multipliers = motion.system, solution.multipliers.copy()
     grows = np.zeros(system.m, dtype=bool)
     last, without = float(solution.t[-1]), dict[tuple[str, ...], list[float]]()
-    width = _BEYOND * width_beside(drive, last, system.mechanism)
+    width = _BEYOND * motion.beside
     for passed in motion.passed:
         near, far = sorted((passed, last - passed))
         steps = min(width, 0.5 * near) * np.array([-2.0, -1.0, 1.0, 2.0])

@@ -296,7 +296,7 @@ def followed(
     if not found.closed:
         raise _barred(law, loops, found.last, found.stopped, first)
     if law is not None and _folded(loops, found.last):
-        # Accelerations at the end are rounding errors, unless the motion beyond a change point tells them.
+        # Accelerations at the end are rounding errors, unless they follow from the motion beyond a change point.
         beyond = np.append(grid, grid[-1] + 2.0 * beside), np.append(keep, False)
         more, later = follow_past(loops, no_target, *beyond, first, beside)
         if more.closed:

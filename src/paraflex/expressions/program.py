@@ -59,11 +59,8 @@ def operations_of(text: str, parameters: Mapping[str, float]) -> tuple[Operation
             case ast.Name(id=name):
                 if name == TIME_NAME:
                     return add(Operation(TIME))
-                return add(
-                    Operation(
-                        NUMBER, number=look_up(name, parameters, f"of a joint write {name}.angle or {name}.travel")
-                    )
-                )
+                remedy = f"of a joint write {name}.angle or {name}.travel"
+                return add(Operation(NUMBER, number=look_up(name, parameters, remedy)))
             case ast.BinOp(left=number, op=ast.MatMult()):
                 return visit(number)
             case ast.BinOp(left=left, op=op, right=right) if type(op) in _BINARY:

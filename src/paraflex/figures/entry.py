@@ -46,7 +46,7 @@ class Figure:
     written_as : str
         Stem of the file that the command which makes the results writes; empty if that command does not write it.
     written_with : tuple of str
-        Variables and attributes without which the command does not write the figure.
+        Attributes, and variables with values, without which the command does not write the figure.
     variables : tuple of str
         Variables of the dataset that the figure requires.
     points : str
@@ -106,8 +106,10 @@ class Figure:
 
     def is_written(self, data: Any) -> bool:
         """Check whether the command that makes the results writes the figure."""
-        there = {*data, *data.variables, *data.attrs} if isinstance(data, xr.Dataset) else data
-        return bool(self.written_as) and all(name in there for name in self.written_with)
+        attributes = getattr(data, "attrs", ())
+        return bool(self.written_as) and all(
+            name in attributes or (name in data and bool(data[name].notnull().any())) for name in self.written_with
+        )
 
     def describe(self, data: Any, **options: Any) -> list[Chart]:
         """Return the charts of results from `prepared`; charts without any value are left out."""

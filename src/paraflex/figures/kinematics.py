@@ -58,14 +58,9 @@ def kinematics_tiles(data: xr.Dataset) -> list[tuple[str, str, str]]:
     if drive := found["drive"]:
         shown = display_unit(unit, max(abs(drive["start"]), abs(drive["end"])))
         ends = [number(drive[end], factor=shown.factor) for end in ("start", "end")]
-        turn = "a whole turn, " if drive["full_turn"] else ""
-        tiles.append(
-            (
-                f"{drive['joint']} moves",
-                f"{' to '.join(ends)} {shown.name}",
-                f"{turn}at {quantity(drive['speed'], unit + '/s')}",
-            )
-        )
+        speed = f"at {quantity(drive['speed'], unit + '/s')}"
+        how = f"a whole turn, {speed}" if drive["full_turn"] else speed
+        tiles.append((f"{drive['joint']} moves", f"{' to '.join(ends)} {shown.name}", how))
     if angles := found["transmission_angles"]:
         least = min(angles, key=lambda one: one["smallest"]["value"])
         at = quantity(least["smallest"][key], unit, padded=False)

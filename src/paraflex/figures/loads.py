@@ -9,7 +9,7 @@ import xarray as xr
 
 from paraflex.formatting import NO_VALUE, display_unit, number, peak, text_symbol
 from paraflex.results.beam_stresses import CONTACT, stresses_of
-from paraflex.results.kinematics import KINEMATICS, RIGID_TORQUES
+from paraflex.results.kinematics import KINEMATICS
 from paraflex.results.loads import resolved_error, sliding_joints
 from paraflex.units import EFFORTS
 from .charts import DOTTED, Axis, Chart, Curve, look
@@ -86,7 +86,7 @@ def _under_contacts(run: xr.Dataset, body: str) -> np.ndarray:
 
 @figure(
     "magnitude of the force in every joint over time", heading="Joints", takes="mode", variables=("joint_force",),
-    height=56.0, written_as="joint_forces", written_with=(RIGID_TORQUES,),
+    height=56.0, written_as="joint_forces", written_with=(KINEMATICS, "frame_force"),
 )  # fmt: skip
 def joint_forces(data: xr.Dataset) -> Iterator[Chart]:
     """Yield the chart of the magnitudes of all joint forces or of one, with components if there is a single run."""
@@ -128,7 +128,7 @@ def joint_motions(data: xr.Dataset) -> Iterator[Chart]:
 
 
 @figure("torque, speed and power of motors and prescribed motions", heading=_LOADS, takes="mode", height=34.0,
-        written_as="drive_efforts", written_with=(RIGID_TORQUES,))  # fmt: skip
+        written_as="drive_efforts", written_with=(KINEMATICS, "frame_force"))  # fmt: skip
 def drive_efforts(data: xr.Dataset) -> Iterator[Chart]:
     """Yield charts of torque or force, speed and power of motors and prescribed motions over time."""
     torque = "torque" if "torque" in data else "applied_torque"
@@ -164,7 +164,7 @@ def drive_efforts(data: xr.Dataset) -> Iterator[Chart]:
 
 @figure(
     "shaking force and moment of the mechanism on the ground", heading=_LOADS, takes="mode", variables=("frame_force",),
-    height=40.0, written_as="frame_loads", written_with=(RIGID_TORQUES,),
+    height=40.0, written_as="frame_loads", written_with=(KINEMATICS, "frame_force"),
 )  # fmt: skip
 def frame_loads(data: xr.Dataset) -> Iterator[Chart]:
     """Yield charts of force and moment of the mechanism on the ground, the latter about the origin."""

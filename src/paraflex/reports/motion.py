@@ -35,10 +35,9 @@ def motion_page(data: xr.Dataset) -> Page:
     found = kinematics_of(data)
     # Without masses there are no forces.
     forceless = found and loads[""]["frame"]["force_max"] is None
-    joint = found.get("over", "")
     return replace(
         page,
-        over=joint if any(one.name == joint for one in page.abscissae) else "",
+        over=found.get("over", ""),
         kind="kinematics" if found else "run",
         subtitle=_subtitle(data),
         facts=common_facts(data),

@@ -86,7 +86,7 @@ class Page(Shown):
     abscissae : sequence of Abscissa
         Quantities over which the reader may see the charts over time.
     over : str
-        Name of the abscissa shown first; empty (default) for the time.
+        Name of the abscissa shown first; the time (default) where there is none of this name.
     runs : sequence of str
         Names of the runs that can be selected.
     groups : sequence of (str, int)
@@ -221,7 +221,7 @@ def _data(page: Page) -> dict[str, Any]:
         "time": time,
         "abscissae": [{"name": axis.name, "label": axis.label(unit), "rows": [series.add(unit.factor * x) for x in row]}
                       for _, axis, row, _ in page.abscissae for unit in [axis.unit_for(row)]],
-        "over": [axis.name for axis in page.abscissae].index(page.over) + 1 if page.over else 0,
+        "over": next((k for k, one in enumerate(page.abscissae, start=1) if one.name == page.over), 0),
         "runs": list(page.runs),
         "groups": [list(group) for group in page.groups],
         "selecting": page.selecting,

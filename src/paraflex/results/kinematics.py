@@ -10,8 +10,8 @@ import xarray as xr
 if TYPE_CHECKING:
     from paraflex.driven import DrivenMotion, Flywheel
 
-# Attribute of a dataset with the properties of a driven motion, as JSON, and one of motions with torques and forces.
-KINEMATICS, RIGID_TORQUES = "kinematics", "rigid_torques"
+# Attribute of a dataset with the properties of a driven motion, as JSON.
+KINEMATICS = "kinematics"
 
 
 def add_kinematics(
@@ -44,8 +44,6 @@ def add_kinematics(
     if flywheel is not None:
         found["flywheel"] = asdict(flywheel)
     data.attrs[KINEMATICS] = json.dumps(found)
-    if np.isfinite(data["frame_force"]).any():
-        data.attrs[RIGID_TORQUES] = "true"
     # The motion is exact to rounding.
     data.attrs.pop("tolerance", None)
 
