@@ -46,7 +46,7 @@ docs: $(VENV)/.dev
 $(VENV)/.run: pyproject.toml constraints.txt
 	$(PYTHON) -m venv $(VENV)
 	$(BIN)/python -m pip install --quiet --disable-pip-version-check --constraint constraints.txt --upgrade pip
-	$(PIP) --editable .
+	$(PIP) --editable '.[edit]'
 	touch $@
 
 $(VENV)/.dev: $(VENV)/.run

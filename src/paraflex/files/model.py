@@ -370,6 +370,17 @@ def model_from(data: dict[str, Any], source: str, text: str = "") -> Model:
         return _model(validate(ModelTable, data, source), data, source, text)
 
 
+def model_of_text(text: str, source: str, folder: FilePath) -> Model:
+    """Build a model from the text of a file that need not exist; file names in it refer to a folder.
+
+    Raises
+    ------
+    InputError
+        See `load`.
+    """
+    return model_from(_parsed(text, source, folder, {}), source, text)
+
+
 def _parsed(text: str, source: str, folder: FilePath, settings: Mapping[str, Any]) -> dict[str, Any]:
     with naming(source):
         return with_rows(with_values(parse_toml(text), settings), folder, list(settings.values()))

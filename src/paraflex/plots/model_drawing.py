@@ -62,7 +62,7 @@ def model_drawing(posed: Posed, *, width: float = TWO_COLUMNS, theme_name: str =
     """
     look, mechanism = theme(theme_name), posed.mechanism
     with journal_style():
-        shown = _scene(posed)
+        shown = posed_scene(posed)
         limits, aspect = shown.limits.filling(_FLATTEST, _TALLEST)
         acting, sensors = acting_arrows(posed, shown, limits), sensor_marks(posed, limits)
         entries = _entries(posed, shown, acting, sensors, limits, look)
@@ -103,7 +103,7 @@ def model_drawing(posed: Posed, *, width: float = TWO_COLUMNS, theme_name: str =
     return figure
 
 
-def _scene(posed: Posed) -> Scene:
+def posed_scene(posed: Posed) -> Scene:
     """Return the scene of the start pose; without an end-effector it has no trail."""
     shown = scene(posed.data, posed.data["time"].values, 1.0)
     ground = {joint.name: posed.mechanism.ground[ref.point] for joint in posed.mechanism.joints

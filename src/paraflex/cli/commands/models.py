@@ -47,6 +47,16 @@ class DrawRequest:
 
 
 @dataclass(frozen=True, kw_only=True)
+class EditRequest:
+    """Options of `paraflex edit`."""
+
+    source: str | None = argument(
+        "NAME|FILE", "A library mechanism or a TOML file, which need not exist. Default: an empty sheet.", default=None
+    )
+    open: bool = switch("--open/--no-open", "Open the page in the browser, or print its address only.", default=True)
+
+
+@dataclass(frozen=True, kw_only=True)
 class ModesRequest:
     """Options of `paraflex modes`."""
 

@@ -153,6 +153,10 @@ COMMANDS = (
         Draw a mechanism before anything runs: bodies, joints by kind, motors, springs, loads, path, and their names.
 
         Loops that do not close are drawn as given, open joints marked."""),
+    ListedCommand("edit", models.EditRequest, "edit.edit_command", """
+        Draw a mechanism on a page in the browser, drag it, see its numbers, run it, and save its file.
+
+        The page is served on this machine alone, until it is closed or Ctrl-C ends it."""),
     ListedCommand("new", models.NewRequest, "create.new_command", """
         Write a commented model file to edit."""),
     ListedCommand("schema", models.SchemaRequest, "create.schema_command", """

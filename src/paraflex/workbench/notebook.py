@@ -1,0 +1,67 @@
+"""The page in a notebook, as an anywidget."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from paraflex.errors import InputError
+from .document import Document
+from .page import module, style
+from .session import Session
+
+if TYPE_CHECKING:
+    from paraflex.files import Model
+    from paraflex.mechanism import Mechanism
+
+
+def edit(model: Model | Mechanism | str | Path | None = None) -> Any:
+    """Return a widget that edits a model in a notebook.
+
+    Parameters
+    ----------
+    model : Model, Mechanism, str or Path, optional
+        Model, or its name or file; an empty sheet by default. The widget's `text` is the text of the model's file.
+
+    Raises
+    ------
+    InputError
+        Model that cannot be read, or anywidget is missing.
+    """
+    try:
+        from anywidget import AnyWidget
+    except ImportError:
+        raise InputError("anywidget is missing", field="edit", remedy="pip install 'paraflex[edit]'") from None
+
+    class Workbench(AnyWidget):
+        """Editor of one document; `text` is its text and `model` what it describes."""
+
+        _esm = module()
+        _css = style()
+
+        def __init__(self, document: Document) -> None:
+            super().__init__()
+            self.session = Session(document, self.send)
+            self.on_msg(lambda _, message, __: self.send(self.session.answer(message)))
+
+        @property
+        def text(self) -> str:
+            """Text of the model's file."""
+            return self.session.document.text
+
+        @property
+        def edited(self) -> Model:
+            """Model of the text; InputError if it cannot be read."""
+            return self.session.bench.read()
+
+    return Workbench(_document(model))
+
+
+def _document(model: Model | Mechanism | str | Path | None) -> Document:
+    if model is None or isinstance(model, str | Path):
+        return Document(None if model is None else str(model))
+    from paraflex.files.model import text_of_model
+
+    document = Document(None)
+    document.begin(text_of_model(model), getattr(model, "name", ""))
+    return document
