@@ -10,11 +10,8 @@ from paraflex.mechanism import JOINT_KINDS
 from paraflex.mechanism.joints import GROUND
 from paraflex.mechanism.poses import Pose
 from paraflex.mechanism.quantities import known
-from .sheet import XY, Sheet, check_name, direction, placed, without_spare_places
-
-Action = Mapping[str, Any]
-# Sheet after an action, and what is selected on it then: "body.link1" or the like.
-Done = tuple[Sheet, str]
+from .changing import rename
+from .sheet import XY, Action, Done, Sheet, check_name, direction, placed, without_spare_places
 
 _SECTION = {"width": "30 mm", "thickness": "5 mm"}
 _MATERIAL = {"youngs_modulus": "70 GPa", "density": 2700.0}
@@ -28,7 +25,7 @@ def add_ground(sheet: Sheet, action: Action) -> Done:
     """Add a point of the ground."""
     name = action.get("name") or sheet.fresh_point()
     check_name(name, sheet.names("ground"), f"ground.{name}")
-    return sheet.set(("ground", name), list(_xy(action, "at"))), f"ground.{name}"
+    return sheet.put(("ground", name), list(_xy(action, "at"))), f"ground.{name}"
 
 
 def add_link(sheet: Sheet, action: Action) -> Done:
@@ -48,11 +45,11 @@ def add_link(sheet: Sheet, action: Action) -> Done:
     for each, (start, second, *_) in places.items():
         turned = direction(start, second) if isinstance(ends[0], str) and isinstance(ends[1], str) else angle
         frames[each] = {body: Pose(turned, start)}
-        sheet = sheet.set(("assembly", each, body), turned)
+        sheet = sheet.put(("assembly", each, body), turned)
     for name, end in zip(names, ends, strict=True):
         if isinstance(end, str):
             joint = name if name not in sheet.names("joint") else sheet.fresh(name, "joint")
-            sheet = sheet.set(("joint", joint), [end, f"{body}.{name}"])
+            sheet = sheet.put(("joint", joint), [end, f"{body}.{name}"])
     if not any(isinstance(end, str) for end in ends[:1]):
         held = next((k for k, end in enumerate(ends) if isinstance(end, str)), None)
         frames = frames if held is None else _held_at(frames, body, local[held], places, held)
@@ -81,7 +78,7 @@ def add_joint(sheet: Sheet, action: Action) -> Done:
         fields["length"] = hypot(end[0] - start[0], end[1] - start[1])
     fields = {key: value for key, value in fields.items() if abs(value) > 1e-9}
     if kind == "revolute":
-        sheet = sheet.set(("joint", name), [a, b])
+        sheet = sheet.put(("joint", name), [a, b])
     else:
         sheet = sheet.table(("joint", name), {"type": kind, "points": [a, b]} | fields)
     bodies = {ref.partition(".")[0] for ref in (a, b)}
@@ -99,7 +96,7 @@ def add_slider(sheet: Sheet, action: Action) -> Done:
         rail = at
     else:
         point = sheet.fresh_point()
-        rail, sheet = f"{GROUND}.{point}", sheet.set(("ground", point), list(place))
+        rail, sheet = f"{GROUND}.{point}", sheet.put(("ground", point), list(place))
     if action.get("block", True) is False:
         if not pinned:
             raise InputError("a slot holds the point of a link", field="at", value=at, remedy="choose a point of a link")
@@ -109,11 +106,11 @@ def add_slider(sheet: Sheet, action: Action) -> Done:
     sheet = sheet.table(("body", body), {"type": "rigid", "points": {pin: [0.0, 0.0]}})
     frames = {}
     for each in sheet.names("assembly"):
-        sheet = sheet.set(("assembly", each, body), 0.0)
+        sheet = sheet.put(("assembly", each, body), 0.0)
         frames[each] = {body: Pose(0.0, _place(before, at, each) if pinned else place)}
     if pinned:
         name = pin if pin not in sheet.names("joint") else sheet.fresh(pin, "joint")
-        sheet = sheet.set(("joint", name), [at, f"{body}.{pin}"])
+        sheet = sheet.put(("joint", name), [at, f"{body}.{pin}"])
     name = sheet.fresh("rail", "joint")
     direct = {"direction": along} if along else {}
     sheet = sheet.table(("joint", name), {"type": "prismatic", "points": [rail, f"{body}.{pin}"]} | direct)
@@ -131,25 +128,23 @@ def add_point(sheet: Sheet, action: Action) -> Done:
     x, y = _xy(action, "at")
     local = _turned((x - frame.position[0], y - frame.position[1]), -frame.angle)
     on_axis = sheet.data["body"][body].get("type") in ("beam", "assumed-modes")
-    return sheet.set(("body", body, "points", name), local[0] if on_axis else list(local)), f"body.{body}"
+    return sheet.put(("body", body, "points", name), local[0] if on_axis else list(local)), f"body.{body}"
 
 
 def add_motor(sheet: Sheet, action: Action) -> Done:
     """Add a motor at a joint, and enter it in the mode of all motors."""
     joint = _undriven(sheet, action)
     name, others = sheet.free_name(action, "motor", "motor"), sheet.names("motor")
-    sheet = sheet.set(("motor", name), joint)
+    sheet = sheet.put(("motor", name), joint)
     modes = sheet.data.get("mode", {})
     whole = next((mode for mode, motors in modes.items() if motors == others and mode == "+" * len(others)), None)
     if whole is not None and others:
         listed = [mode for mode in modes if mode != whole and set(mode) <= set("+-0")]
         if not listed:
-            from .changing import rename
-
             sheet = sheet.append(("mode", whole), name)
             return rename(sheet, {"kind": "rename", "of": "mode", "name": whole, "to": whole + "+"})[0], f"motor.{name}"
     if not modes:
-        sheet = sheet.set(("mode", "+" * (len(others) + 1)), [*others, name])
+        sheet = sheet.put(("mode", "+" * (len(others) + 1)), [*others, name])
     return sheet, f"motor.{name}"
 
 
@@ -161,7 +156,7 @@ def add_mode(sheet: Sheet, action: Action) -> Done:
     signs = "".join("+" if each in motors else "-" for each in sheet.names("motor"))
     name = action.get("name") or signs
     check_name(name, sheet.names("mode"), f"mode.{name}")
-    return sheet.set(("mode", name), motors), f"mode.{name}"
+    return sheet.put(("mode", name), motors), f"mode.{name}"
 
 
 def add_drive(sheet: Sheet, action: Action) -> Done:
@@ -171,7 +166,7 @@ def add_drive(sheet: Sheet, action: Action) -> Done:
     sheet = sheet.table(("prescribed", name), {"joint": joint, "speed": speed})
     study = sheet.data.get("study", {})
     if not study.keys() & {"duration", "path", "paths"}:
-        sheet = sheet.set(("study", "duration"), abs(2.0 * pi / speed) if not _slides(sheet, joint) else 1.0)
+        sheet = sheet.put(("study", "duration"), abs(2.0 * pi / speed) if not _slides(sheet, joint) else 1.0)
     return sheet, f"prescribed.{name}"
 
 
@@ -214,7 +209,7 @@ def add_lump(sheet: Sheet, action: Action) -> Done:
     lump = action.get("name") or next(iter(sheet.names("lump")), "pin")
     if lump not in sheet.names("lump"):
         sheet = sheet.table(("lump", lump), {key: action.get(key, value) for key, value in _LUMP.items()})
-    return sheet.set(("body", body, "lumps", point), lump), f"body.{body}"
+    return sheet.put(("body", body, "lumps", point), lump), f"body.{body}"
 
 
 def add_sensor(sheet: Sheet, action: Action) -> Done:
@@ -233,7 +228,7 @@ def add_sensor(sheet: Sheet, action: Action) -> Done:
 def set_effector(sheet: Sheet, action: Action) -> Done:
     """Let a point be the end-effector; a new one has as many task coordinates as there are degrees of freedom."""
     if "end_effector" in sheet.data:
-        return sheet.set(("end_effector", "point"), action.get("at")), "end_effector"
+        return sheet.put(("end_effector", "point"), action.get("at")), "end_effector"
     coordinates = action.get("coordinates") or _COORDINATES.get(_freedoms(sheet), ["x", "y"])
     table = {"point": action.get("at"), "coordinates": list(coordinates)}
     return sheet.table(("end_effector",), table), "end_effector"
@@ -258,13 +253,13 @@ def add_path(sheet: Sheet, action: Action) -> Done:
         table.setdefault("motion_time", max(len(corners) - 1, 1) * _MOTION)
     sheet = sheet.table(("path", name), {"type": kind} | table)
     if not sheet.data.get("study", {}).keys() & {"path", "paths", "torques"}:
-        sheet = sheet.set(("study", "path"), name)
+        sheet = sheet.put(("study", "path"), name)
     return sheet, f"path.{name}"
 
 
 def add_gravity(sheet: Sheet, action: Action) -> Done:
     """Set the vector of free fall [m/s^2], by default along -y."""
-    return sheet.set(("gravity",), [float(each) for each in action.get("value", [0.0, -9.81])]), "gravity"
+    return sheet.put(("gravity",), [float(each) for each in action.get("value", [0.0, -9.81])]), "gravity"
 
 
 def _member(sheet: Sheet, action: Action, table: str, fields: Mapping[str, Any], stem: str = "") -> Done:

@@ -19,16 +19,17 @@ _BARE = re.compile(r"[A-Za-z0-9_-]+\Z")
 _ORDER = list(ModelTable.model_fields)
 
 
-def written(value: Any) -> str:
-    """Return a value as TOML in one line; numbers are rounded to the digits of a drawing."""
+def written(value: Any, *, exact: bool = False) -> str:
+    """Return a value as TOML in one line; numbers are rounded to the digits of a drawing unless they are exact."""
     if isinstance(value, bool):
         return str(value).lower()
     if isinstance(value, float):
-        return number_text(value)
+        return repr(value) if exact else number_text(value)
     if isinstance(value, Mapping):
-        return f"{{ {', '.join(f'{key_text(key)} = {written(each)}' for key, each in value.items())} }}"
+        members = [f"{key_text(key)} = {written(each, exact=exact)}" for key, each in value.items()]
+        return f"{{ {', '.join(members)} }}" if members else "{}"
     if isinstance(value, list | tuple):
-        return f"[{', '.join(map(written, value))}]"
+        return f"[{', '.join(written(each, exact=exact) for each in value)}]"
     return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f") if isinstance(value, str) else str(value)
 
 
@@ -57,11 +58,11 @@ def with_value(text: str, place: Sequence[str | int], value: str) -> str:
     return _checked(text, edited, place, parse_toml(f"value = {value}")["value"])
 
 
-def with_table(text: str, place: Sequence[str], table: Mapping[str, Any]) -> str:
+def with_table(text: str, place: Sequence[str], table: Mapping[str, Any], *, exact: bool = False) -> str:
     """Add a table with a header of its own behind the others of its kind."""
-    lines = [f"[{'.'.join(map(key_text, place))}]", *(f"{key_text(key)} = {written(one)}" for key, one in table.items())]
-    edited = _with_section(text, tuple(place), lines)
-    return _checked(text, edited, tuple(place), parse_toml(f"value = {written(table)}")["value"])
+    members = [f"{key_text(key)} = {written(one, exact=exact)}" for key, one in table.items()]
+    edited = _with_section(text, tuple(place), [f"[{'.'.join(map(key_text, place))}]", *members])
+    return _checked(text, edited, tuple(place), parse_toml(f"value = {written(table, exact=exact)}")["value"])
 
 
 def with_item(text: str, place: Sequence[str | int], value: str) -> str:

@@ -22,6 +22,7 @@ from paraflex.mechanism.poses import Pose, approximate_poses, local_points, plac
 from .edits import with_item, with_table, with_value, without, written
 
 XY = tuple[float, float]
+Action = Mapping[str, Any]
 # Stands in for the bodies of a sheet without any, so that the rest of the file is read and checked.
 _NO_BODY = {"body": {"none": {"type": "rigid", "points": {"none": [0.0, 0.0]}}}}
 
@@ -138,7 +139,7 @@ class Sheet:
         """Return the sheet of another text."""
         return replace(self, text=text)
 
-    def set(self, place: Sequence[Any], value: Any) -> "Sheet":
+    def put(self, place: Sequence[Any], value: Any) -> "Sheet":
         """Write a value at a place."""
         return self.with_text(with_value(self.text, place, written(value)))
 
@@ -146,9 +147,9 @@ class Sheet:
         """Append an item to the list at a place."""
         return self.with_text(with_item(self.text, place, written(value)))
 
-    def table(self, place: Sequence[str], table: Mapping[str, Any]) -> "Sheet":
-        """Add a table."""
-        return self.with_text(with_table(self.text, place, table))
+    def table(self, place: Sequence[str], table: Mapping[str, Any], *, exact: bool = False) -> "Sheet":
+        """Add a table; its numbers are rounded to the digits of a drawing unless they are exact."""
+        return self.with_text(with_table(self.text, place, table, exact=exact))
 
     def without(self, place: Sequence[Any]) -> "Sheet":
         """Remove the value or table at a place."""
@@ -178,6 +179,10 @@ class Sheet:
         return {one.name: _unplaced(found, one) for one in found.assemblies} if found else {}
 
 
+# Sheet after an action, and what is selected on it then: "body.link1" or the like.
+Done = tuple[Sheet, str]
+
+
 def check_name(name: Any, names: Iterable[str], field: str) -> None:
     """Check that a new name is a text that can stand in a reference and that is not taken."""
     if not isinstance(name, str) or not name or "." in name or not name.isprintable():
@@ -205,7 +210,7 @@ def placed(before: Sheet, after: Sheet, frames: Mapping[str, Mapping[str, Pose]]
                 continue
             pose, (point, local) = poses.get(body), next(iter(after.locals[body].items()))
             if pose is not None and pose.position is not None:
-                after = after.set(("assembly", assembly, "points", f"{body}.{point}"), pose.place_of(local))
+                after = after.put(("assembly", assembly, "points", f"{body}.{point}"), pose.place_of(local))
     return after
 
 
