@@ -11,7 +11,7 @@ from paraflex.mechanism.joints import GROUND
 from paraflex.mechanism.poses import Pose
 from paraflex.mechanism.quantities import known
 from .changing import rename
-from .sheet import XY, Action, Done, Sheet, check_name, direction, placed, without_spare_places
+from .sheet import XY, Action, Done, Sheet, check_name, direction, placed, tidy, without_spare_places
 
 _SECTION = {"width": "30 mm", "thickness": "5 mm"}
 _MATERIAL = {"youngs_modulus": "70 GPa", "density": 2700.0}
@@ -25,7 +25,7 @@ def add_ground(sheet: Sheet, action: Action) -> Done:
     """Add a point of the ground."""
     name = action.get("name") or sheet.fresh_point()
     check_name(name, sheet.names("ground"), f"ground.{name}")
-    return sheet.put(("ground", name), list(_xy(action, "at"))), f"ground.{name}"
+    return sheet.put(("ground", name), tidy(_xy(action, "at"))), f"ground.{name}"
 
 
 def add_link(sheet: Sheet, action: Action) -> Done:
@@ -76,7 +76,7 @@ def add_joint(sheet: Sheet, action: Action) -> Done:
         fields["angle"] = turned[1] - turned[0]
     if "distance" in JOINT_KINDS[kind].holds:
         fields["length"] = hypot(end[0] - start[0], end[1] - start[1])
-    fields = {key: value for key, value in fields.items() if abs(value) > 1e-9}
+    fields = {key: value for key, value in fields.items() if abs(value) > 1e-6}
     if kind == "revolute":
         sheet = sheet.put(("joint", name), [a, b])
     else:
@@ -96,7 +96,7 @@ def add_slider(sheet: Sheet, action: Action) -> Done:
         rail = at
     else:
         point = sheet.fresh_point()
-        rail, sheet = f"{GROUND}.{point}", sheet.put(("ground", point), list(place))
+        rail, sheet = f"{GROUND}.{point}", sheet.put(("ground", point), tidy(place))
     if action.get("block", True) is False:
         if not pinned:
             raise InputError("a slot holds the point of a link", field="at", value=at, remedy="choose a point of a link")
@@ -128,7 +128,7 @@ def add_point(sheet: Sheet, action: Action) -> Done:
     x, y = _xy(action, "at")
     local = _turned((x - frame.position[0], y - frame.position[1]), -frame.angle)
     on_axis = sheet.data["body"][body].get("type") in ("beam", "assumed-modes")
-    return sheet.put(("body", body, "points", name), local[0] if on_axis else list(local)), f"body.{body}"
+    return sheet.put(("body", body, "points", name), local[0] if on_axis else tidy(local)), f"body.{body}"
 
 
 def add_motor(sheet: Sheet, action: Action) -> Done:
@@ -303,7 +303,7 @@ def _with_assembly(sheet: Sheet) -> Sheet:
 def _with_body(sheet: Sheet, body: str, points: Mapping[str, XY], flexible: bool) -> Sheet:
     (_, (_, _)), (last, (length, _)), *further = points.items()
     if further or not flexible:
-        return sheet.table(("body", body), {"type": "rigid", "points": {key: list(xy) for key, xy in points.items()}})
+        return sheet.table(("body", body), {"type": "rigid", "points": {key: tidy(xy) for key, xy in points.items()}})
     sheet, section = _with_first(sheet, "section", "bar", _SECTION)
     sheet, material = _with_first(sheet, "material", "aluminium", _MATERIAL)
     table = {"type": "beam", "length": length, "section": section, "material": material,

@@ -208,9 +208,9 @@ def placed(before: Sheet, after: Sheet, frames: Mapping[str, Mapping[str, Pose]]
             # A body that is placed may determine the place of the next one.
             if body not in bodies - known.get(assembly, set()) or body not in after.unplaced()[assembly]:
                 continue
-            pose, (point, local) = poses.get(body), next(iter(after.locals[body].items()))
-            if pose is not None and pose.position is not None:
-                after = after.put(("assembly", assembly, "points", f"{body}.{point}"), pose.place_of(local))
+            pose, (point, local) = poses.get(body), next(iter(after.locals[body].items()), ("", (0.0, 0.0)))
+            if point and pose is not None and pose.position is not None:
+                after = after.put(("assembly", assembly, "points", f"{body}.{point}"), tidy(pose.place_of(local)))
     return after
 
 
@@ -228,6 +228,11 @@ def without_spare_places(sheet: Sheet, bodies: Iterable[str]) -> Sheet:
 def near(angle: float, other: float) -> float:
     """Return an angle plus the whole turns that bring it nearest to another [rad]."""
     return angle + 2.0 * pi * round((other - angle) / (2.0 * pi))
+
+
+def tidy(place: XY) -> list[float]:
+    """Return a place without the rounding errors of coordinates that are zero."""
+    return [x if abs(x) > 1e-6 else 0.0 for x in place]
 
 
 def direction(start: XY, end: XY) -> float:
