@@ -1,0 +1,1 @@
+"""The workbench: a page on which mechanisms are drawn, moved and run, and the host that serves it."""

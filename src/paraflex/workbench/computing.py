@@ -1,0 +1,221 @@
+"""Runs of a model's text: its study along a path in several modes, or its own motion."""
+
+import time
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from paraflex.arrays import Brief
+from paraflex.campaign import OnProgress, Progress
+from paraflex.checks import check
+from paraflex.checks.check import check_planned
+from paraflex.control import simulate_controlled
+from paraflex.designs.own_motion import own_duration, own_run
+from paraflex.dynamics import System, standing_system
+from paraflex.errors import InputError, NumericalError
+from paraflex.files import Model, model_from
+from paraflex.files.read import naming, parse_toml
+from paraflex.files.rows import with_rows
+from paraflex.integrators import IntegrationOptions
+from paraflex.integrators.options import TolerancePer
+from paraflex.mechanism import ActuationMode
+from paraflex.mechanism.masses import check_masses
+from paraflex.motion import MotionRun, state_at
+from paraflex.reduced_bodies import AUTO
+from paraflex.reduced_bodies.mechanism import reduced_task
+from paraflex.results import motion_dataset
+from paraflex.results.findings import keep_findings, verdict_of
+from paraflex.studies.tracking import StudyResult, TrackingStudy
+from paraflex.tracking import TrackingRun, TrackingTask, simulate
+
+# Tolerance of coarse runs as a part of the mechanism's size, 25 times the default, and number of their samples.
+_COARSE_TOLERANCE, COARSE_SAMPLES = 1e-3, 121
+
+
+@dataclass(frozen=True)
+class Computed(Brief):
+    """Runs of a model.
+
+    Attributes
+    ----------
+    result : StudyResult
+        Dataset of all runs, also of those that failed on the way, and reasons of modes that could not start.
+    errors : mapping of str to NumericalError
+        Error of each mode that failed, "" for a run without modes.
+    tolerance : float or None
+        Tolerance of the integration [m]; None for a fixed step.
+    samples : int
+        Number of samples.
+    """
+
+    result: StudyResult
+    errors: Mapping[str, NumericalError] = field(default_factory=dict)
+    tolerance: float | None = None
+    samples: int = 0
+
+
+def model_of(text: str, folder: Path | None = None, source: str = "model") -> Model:
+    """Read a model from its text as `load` reads it from a file, without warnings.
+
+    Parameters
+    ----------
+    text : str
+        Text of the model file.
+    folder : Path, optional
+        Folder to which names of tables in the text are relative; the current one by default.
+    source : str
+        Name of the model in errors.
+
+    Raises
+    ------
+    InputError
+        Text that is not a model; see `load`.
+    """
+    with naming(source):
+        data = with_rows(parse_toml(text), folder or Path())
+    return model_from(data, source, text)
+
+
+def computed(
+    model: Model,
+    modes: Sequence[str] = (),
+    path: str | None = None,
+    *,
+    coarse: bool = False,
+    on_progress: OnProgress | None = None,
+) -> Computed:
+    """Run the study of a model as `paraflex run` does: along a path if it has one, else its own motion.
+
+    Parameters
+    ----------
+    model : Model
+        Model to run.
+    modes : sequence of str
+        Actuation modes; by default those of the study.
+    path : str, optional
+        Name of a path of the model; by default that of the study.
+    coarse : bool
+        Whether the runs are coarse: with a tolerance of 1/1000 of the mechanism's size if the study has a finer one,
+        and few samples.
+    on_progress : callable, optional
+        Function called with the progress in simulated seconds; a KeyboardInterrupt that it raises stops the runs.
+
+    Raises
+    ------
+    InputError, NumericalError
+        A study that cannot be run, or whose plan fails.
+    """
+    check_masses(model.mechanism)
+    if model.paths or path is not None:
+        return _along(model, modes, path, coarse=coarse, on_progress=on_progress)
+    if modes:
+        remedy = "add a [path.NAME] table, or give torques in [study]"
+        raise InputError("a model without a path has no actuation modes", field="modes", value=modes[0], remedy=remedy)
+    return _own_motion(model, coarse=coarse, on_progress=on_progress)
+
+
+def _along(
+    model: Model, names: Sequence[str], path: str | None, *, coarse: bool, on_progress: OnProgress | None
+) -> Computed:
+    name, modes, controllers = model.path_name(path), list(model.modes(names)), model.acting()
+    if not modes:
+        raise InputError(
+            "no actuation mode to run", field="modes", remedy="add a [motor.NAME], or [study] modes to the file"
+        )
+    task = model.plan(name, samples=_samples(model, coarse=coarse), warning=False)
+    options = _options(model, task.system, coarse=coarse)
+    few, full, reduction = _reduced(model, task, options, modes)
+    simulator = _Simulator(options, controllers)
+    study = TrackingStudy(
+        few, modes, options, _provenance(model, options, path=name, modes=[mode.name for mode in modes]), simulator,
+        model.study.error, warning=False, reduction=reduction, full=None if coarse else full,
+        findings=() if coarse else check_planned(model, task, name, modes, None),
+    )  # fmt: skip
+    result = study.run(on_progress=on_progress)
+    if result.data is not None:
+        keep_findings(result.data, verdict_of(result.data))
+    return Computed(result, simulator.errors, _tolerance(options, task.system), task.motion.t.size)
+
+
+def _reduced(
+    model: Model, task: TrackingTask, options: IntegrationOptions, modes: Sequence[ActuationMode]
+) -> tuple[TrackingTask, TrackingTask | None, Any]:
+    """Return the task with the coordinates that the study keeps, that with all for comparison, and the reduction."""
+    kept = model.study.reduced
+    if not kept:
+        return task, None, None
+    few, reduction = reduced_task(task, kept, options.tolerance_for(task.system), modes)
+    return few, None if kept == AUTO else task, reduction
+
+
+class _Simulator:
+    """Simulator of a tracking study, which keeps the errors of its modes."""
+
+    def __init__(self, options: IntegrationOptions, controllers: Sequence[Any]) -> None:
+        self.errors: dict[str, NumericalError] = {}
+        self._simulate: Callable[..., TrackingRun] = partial(simulate, options=options, warning=False)
+        if controllers:
+            self._simulate = partial(simulate_controlled, controllers=controllers, options=options)
+
+    def __call__(
+        self, task: TrackingTask, mode: str | ActuationMode, *, on_progress: Callable[[float], None] | None = None
+    ) -> TrackingRun:
+        try:
+            return self._simulate(task, mode, on_progress=on_progress)
+        except NumericalError as error:
+            self.errors[getattr(mode, "name", str(mode))] = error
+            raise
+
+
+def _own_motion(model: Model, *, coarse: bool, on_progress: OnProgress | None) -> Computed:
+    mechanism = model.mechanism
+    study = replace(model.study, samples=_samples(model, coarse=coarse))
+    end, began = own_duration(study), time.perf_counter()
+    system = standing_system(mechanism, model.start, study.assembly)
+    options = _options(model, system, coarse=coarse)
+    begun = study.assembly if model.start is None else state_at(system, model.start, study.assembly, balanced=False)
+
+    def report(reached: float) -> None:
+        if on_progress is not None:
+            on_progress(Progress(reached, end, reached, time.perf_counter() - began))
+
+    errors = {}
+    try:
+        run = own_run(mechanism, study, model.acting(), start=begun, options=options, on_progress=report)
+    except NumericalError as error:
+        if not isinstance(error.partial, MotionRun):
+            raise
+        run, errors[""] = error.partial, error
+    findings = () if coarse else check(model)
+    data = motion_dataset(run, options=options, parameters=_provenance(model, options), findings=findings)
+    result = StudyResult(data, {}, interrupted=run.solution.status == "interrupted")
+    return Computed(result, errors, _tolerance(options, system), study.samples)
+
+
+def _samples(model: Model, *, coarse: bool) -> int:
+    return min(model.study.samples, COARSE_SAMPLES) if coarse else model.study.samples
+
+
+def _options(model: Model, system: System, *, coarse: bool) -> IntegrationOptions:
+    """Return the integration options of the study, with a coarser tolerance where one is asked for and has an effect."""
+    options, loose = model.study.integration(), _COARSE_TOLERANCE * system.size
+    if not coarse or options.step is not None or options.tolerance_for(system) >= loose:
+        return options
+    return replace(options, tolerance=loose, tolerance_per=TolerancePer.CYCLE if options.controls_errors else None)
+
+
+def _tolerance(options: IntegrationOptions, system: System) -> float | None:
+    return None if options.step is not None else options.tolerance_for(system)
+
+
+def _provenance(model: Model, options: IntegrationOptions, **run: Any) -> dict[str, Any]:
+    """Return the parameters of the model and the settings of its study, from which a page knows the command."""
+    study = model.study
+    settings = {
+        "mechanism": model.source, "set": {}, "error": study.error, "reduced": study.reduced,
+        "controllers": list(study.controllers), "geometry": model.mechanism.geometry.value,
+        "method": options.method.name, "tolerance": study.tolerance, "step": study.step,
+    }  # fmt: skip
+    return {"model": dict(model.parameters), "run": settings | run}
