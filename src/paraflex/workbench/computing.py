@@ -97,8 +97,8 @@ def computed(
     path : str, optional
         Name of a path of the model; by default that of the study.
     coarse : bool
-        Whether the runs are coarse: with a tolerance of 1/1000 of the mechanism's size if the study has a finer one,
-        and few samples.
+        Whether the runs are coarse: by the default method with a tolerance of 1/1000 of the mechanism's size if the
+        study has a finer one, and few samples.
     on_progress : callable, optional
         Function called with the progress in simulated seconds; a KeyboardInterrupt that it raises stops the runs.
 
@@ -199,11 +199,11 @@ def _samples(model: Model, *, coarse: bool) -> int:
 
 
 def _options(model: Model, system: System, *, coarse: bool) -> IntegrationOptions:
-    """Return the integration options of the study, with a coarser tolerance where one is asked for and has an effect."""
+    """Return the integration options of the study, or those of coarse runs if they allow larger errors."""
     options, loose = model.study.integration(), _COARSE_TOLERANCE * system.size
     if not coarse or options.step is not None or options.tolerance_for(system) >= loose:
         return options
-    return replace(options, tolerance=loose, tolerance_per=TolerancePer.CYCLE if options.controls_errors else None)
+    return IntegrationOptions(tolerance=loose, tolerance_per=TolerancePer.CYCLE)
 
 
 def _tolerance(options: IntegrationOptions, system: System) -> float | None:
