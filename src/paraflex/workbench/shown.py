@@ -14,7 +14,7 @@ from paraflex.findings import DONE_STATUSES
 from paraflex.reports.film import animation, frames_of
 from paraflex.reports.kind_page import kind_page
 from paraflex.reports.packing import deflated
-from paraflex.reports.page import page_data
+from paraflex.reports.page import Page, page_data
 from paraflex.results.beam_stresses import stresses_of
 from paraflex.results.findings import finding_lines, verdict_of
 from paraflex.results.following import headline
@@ -25,15 +25,22 @@ from .computing import Computed
 FRAMES, _STEPS, _UNKNOWN = 181, 254, 255
 
 
-def shown(found: Computed) -> dict[str, Any]:
+def shown(found: Computed, *, charts: bool = True) -> dict[str, Any]:
     """Return runs as plain values for the page.
+
+    Parameters
+    ----------
+    found : Computed
+        Runs of a model.
+    charts : bool
+        Whether the page has charts, which take a quarter of the time.
 
     Returns
     -------
     dict
-        `modes`, their names ("" for a run without modes); `page`, the data of a report's page (`reports.page_data`), with
-        charts, and the film in at most 181 frames; `stress` of the film's stations; `numbers` and `errors` of each mode;
-        `findings`, one line each, and `verdict`, their level.
+        `modes`, their names ("" for a run without modes); `page`, the data of a report's page
+        (`reports.page.page_data`), with charts, and the film in at most 181 frames; `stress` of the film's stations;
+        `numbers` and `errors` of each mode; `findings`, one line each, and `verdict`, their level.
     """
     data = found.result.data
     if data is None:
@@ -44,7 +51,8 @@ def shown(found: Computed) -> dict[str, Any]:
     few = data.isel(time=frames_of(data.sizes["time"], FRAMES))
     modes = names_of(data, "mode") if dims else [""]
     selected = modes.index(default_mode(data)) if dims else 0
-    page = replace(kind_page(data), runs=modes, selected=selected, film=animation(few, dims))
+    page = kind_page(data) if charts else Page("", "", time=few["time"].values)
+    page = replace(page, runs=modes, selected=selected, film=animation(few, dims))
     verdict = verdict_of(data)
     return {
         "modes": modes,

@@ -3,6 +3,7 @@
 It ends with the process that started it, whose end closes its standard input.
 """
 
+import gc
 import os
 import pickle
 import sys
@@ -77,6 +78,9 @@ def main() -> None:
 
     warnings.simplefilter("ignore")
     _warm_up(inbox)
+    # The garbage collector need not look at modules again.
+    gc.collect()
+    gc.freeze()
     send(NO_REQUEST, {"state": READY})
     number = NO_REQUEST
     while True:
@@ -165,7 +169,7 @@ def _send_results(
 
     if stale():
         raise Superseded
-    event = shown(found)
+    event = shown(found, charts=not coarse)
     if stale():
         raise Superseded
     accuracy = {"tolerance": found.tolerance, "samples": found.samples, "coarse": coarse}
