@@ -55,6 +55,12 @@ class Computed(Brief):
     tolerance: float | None = None
     samples: int = 0
 
+    def begun(self) -> "Computed":
+        """Return the runs if any mode has begun; raise the error of the first mode if there is none."""
+        if self.result.data is None:
+            raise next(iter(self.errors.values()), NumericalError("no mode could be run"))
+        return self
+
 
 def model_of(text: str, folder: Path | None = None, source: str = "model") -> Model:
     """Read a model from its text as `load` reads it from a file, without warnings.

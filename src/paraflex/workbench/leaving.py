@@ -8,14 +8,14 @@ from pathlib import Path
 
 from paraflex.campaign import OnProgress
 from paraflex.checks.drawing import pose_of
-from paraflex.errors import InputError, NumericalError
+from paraflex.errors import InputError
 from paraflex.folders import RUN, hold_folder
 from paraflex.formatting import output_units
 from paraflex.limits import FILE_BYTES
 from paraflex.plots.themes import theme
 from paraflex.studies.report import report as report_page
 from paraflex.writing import whole_file
-from .computing import Computed, computed, model_of
+from .computing import computed, model_of
 from .programs import program as program
 
 # Kinds of drawings, resolution of PNG [dots per inch], and the longest link: browsers and chats cut off longer ones.
@@ -60,18 +60,11 @@ def report(
     model = model_of(text, folder, source)
     units = [str(unit) for unit in model.parameters.get("units", {}).values()]
     with hold_folder(out, RUN) as held:
-        found = _begun(computed(model, modes, path, on_progress=on_progress))
+        found = computed(model, modes, path, on_progress=on_progress).begun()
         found.result.save_in(held)
         with output_units(units), held.added_files() as new:
             report_page(found.result).save(new / "report.html")
     return out / "report.html"
-
-
-def _begun(found: Computed) -> Computed:
-    """Return runs of which at least one has begun; raise the error of the first mode if there is none."""
-    if found.result.data is None:
-        raise next(iter(found.errors.values()), NumericalError("no mode could be run"))
-    return found
 
 
 def figures(
@@ -115,7 +108,10 @@ def figures(
     from paraflex.plots.model_drawing import model_drawing
     from paraflex.plots.style import write_figure
 
-    drawing, files = model_drawing(shown, theme_name=theme_name), [out.with_name(f"{out.name}.{kind}") for kind in kinds]
+    drawing, files = (
+        model_drawing(shown, theme_name=theme_name),
+        [out.with_name(f"{out.name}.{kind}") for kind in kinds],
+    )
     for file, kind in zip(files, kinds, strict=True):
         with whole_file(file, field=str(file.parent)) as unfinished:
             write_figure(drawing, unfinished, kind, _DPI)
@@ -155,7 +151,7 @@ def film(
 
     film_kind(out)
     chosen = FilmOptions(**options)  # type: ignore[arg-type]
-    data = _begun(computed(model_of(text, folder, source), modes, path)).result.data
+    data = computed(model_of(text, folder, source), modes, path).begun().result.data
     assert data is not None
     shown = [str(mode) for mode in data["mode"].values] if "mode" in data.dims else []
     animate(data, out, shown, chosen, on_progress=on_progress)

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 import paraflex
-from paraflex.errors import InputError
+from paraflex.errors import InputError, printable
 from paraflex.files import ExpressionProfile, Model
 from paraflex.mechanism import Material, Mechanism, PointRef, Polynomial, Rectangle, Round, Section, Shape, Sine, Tube
 from .computing import model_of
@@ -44,7 +44,17 @@ def program(text: str, folder: Path | None = None, source: str = "model") -> str
     whole = f"mechanism = {writer.value(mechanism)}"
     imports = [f"from {module} import {name}" for module, name in sorted(writer.imports)]
     title = " ".join(f"{mechanism.name}. {mechanism.description}".split())
-    lines = ["# " + title, "import paraflex as pf", *imports, "", "point = pf.PointRef.parse", *shared, "", whole, ""]
+    lines = [
+        f"# {printable(title)}",
+        "import paraflex as pf",
+        *imports,
+        "",
+        "point = pf.PointRef.parse",
+        *shared,
+        "",
+        whole,
+        "",
+    ]
     return "\n".join(lines)
 
 
@@ -81,9 +91,9 @@ class _Writer:
         if isinstance(given, Section | Material) and given in self.names:
             return self.names[given]
         if isinstance(given, PointRef):
-            return f"point({str(given)!r})"
+            return f"point({_quoted(str(given))})"
         if isinstance(given, Enum):
-            return repr(given.value)
+            return _quoted(given.value)
         if isinstance(given, Mapping):
             pairs = [f"{self.value(key)}: {self.value(one, depth + 1)}" for key, one in given.items()]
             return _wrapped("{", pairs, "}", depth)
@@ -97,7 +107,9 @@ class _Writer:
     def call(self, given: Any, depth: int = 0) -> str:
         """Return the call that makes a dataclass."""
         if isinstance(given, Section) and given.shape is not None and given == Section.of(given.shape):
-            return _wrapped(f"pf.Section.{_SHAPES[type(given.shape)]}(", self._arguments(given.shape, depth), ")", depth)
+            return _wrapped(
+                f"pf.Section.{_SHAPES[type(given.shape)]}(", self._arguments(given.shape, depth), ")", depth
+            )
         name, module = type(given).__name__, _ELSEWHERE.get(type(given))
         if module is not None:
             self.imports.add((module, name))
@@ -110,16 +122,15 @@ class _Writer:
 
 
 def _given(given: Any) -> Iterator[tuple[str, Any]]:
-    """Yield the fields of a dataclass that are not at their defaults; names of fields of the file are left out."""
+    """Yield the fields of a dataclass that are not at their defaults."""
     for one in fields(given):
         value = getattr(given, one.name)
         default = one.default if one.default_factory is MISSING else one.default_factory()
-        of_file = one.name == "field" and not one.compare
-        if one.init and (one.repr or isinstance(given, Mechanism)) and not of_file and one.name != "cut":
-            if one.name == "payload" and isinstance(given, Mechanism):
-                continue
-            if default is MISSING or type(value) is not type(default) or not _same(value, default):
-                yield one.name, value
+        # The body that carries a payload includes it; fields of the file are named in errors only.
+        left_out = one.name in ("payload", "cut") or (one.name == "field" and not one.compare)
+        same = default is not MISSING and type(value) is type(default) and _same(value, default)
+        if one.init and not left_out and not same:
+            yield one.name, value
 
 
 def _same(one: Any, other: Any) -> bool:
@@ -132,9 +143,17 @@ def _plain(given: Any) -> str:
         given = given.item()
     if isinstance(given, float) and not math.isfinite(given):
         return f'float("{given}")'
-    if given is None or isinstance(given, bool | int | float | str):
+    if isinstance(given, str):
+        return _quoted(given)
+    if given is None or isinstance(given, bool | int | float):
         return repr(given)
     raise InputError("no program can hold it", field="program", value=given, remedy="save the model's file")
+
+
+def _quoted(text: str) -> str:
+    """Return a text in double quotes where none are in it."""
+    written = repr(text)
+    return f'"{written[1:-1]}"' if written[0] == "'" and '"' not in written else written
 
 
 def _wrapped(opening: str, parts: list[str], closing: str, depth: int) -> str:

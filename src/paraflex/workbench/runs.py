@@ -4,6 +4,7 @@ import pickle
 import subprocess
 import sys
 import threading
+import traceback
 from collections.abc import Callable
 from contextlib import suppress
 from typing import Any
@@ -90,7 +91,7 @@ class Runner:
             number, on_event, self._request = self._number, self._on_event, None
             self._number += 1
             self._hand_over()
-        on_event({"event": "run", "run": number, "state": "cancelled"})
+        _deliver(on_event, number, {"state": "cancelled"})
 
     def close(self) -> None:
         """End the processes; a run under way sends no more events."""
@@ -138,12 +139,13 @@ class Runner:
             if state in (BEGUN, ENDED):
                 process.running = number if state == BEGUN else NO_REQUEST
                 return
-            if number != self._number or process is not self._active or self._request is None:
+            newest = number in (self._number, NO_REQUEST)
+            if not newest or process is not self._active or self._request is None:
                 return
-            on_event = self._on_event
+            number, on_event = self._number, self._on_event
             if state in _LAST:
                 self._request = None
-        on_event({"event": "run", "run": number, **event})
+        _deliver(on_event, number, event)
 
     def _lost(self, process: "_Process", code: int) -> None:
         """Replace a process that has ended by itself, and report the run that it did not finish."""
@@ -161,7 +163,7 @@ class Runner:
         why = f"signal {-code}: out of memory, or killed" if code < 0 else f"exit code {code}"
         text = f"the process of the run ended before it ({why}); run it again"
         error = {"text": text, "kind": "LostWorker", "field": "", "remedy": "run it again", "time": None}
-        on_event({"event": "run", "run": number, "state": "error", "text": text, "error": error})
+        _deliver(on_event, number, {"state": "error", "text": text, "error": error})
 
 
 class _Process:
@@ -204,8 +206,19 @@ class _Process:
             while True:
                 self._runner._taken(self, *pickle.load(self.process.stdout))
         self.process.kill()
-        self._runner._lost(self, self.process.wait())
+        code = self.process.wait()
+        with suppress(OSError):
+            self.process.stdout.close()
+        self._runner._lost(self, code)
 
 
 def _ignore(_: dict[str, Any]) -> None:
     """Take an event of no request."""
+
+
+def _deliver(on_event: OnEvent, number: int, event: dict[str, Any]) -> None:
+    """Pass an event on; what goes wrong there must not end the thread that reads events."""
+    try:
+        on_event({"event": "run", "run": number, **event})
+    except Exception:
+        traceback.print_exc()

@@ -41,11 +41,14 @@ def shown(found: Computed, *, charts: bool = True) -> dict[str, Any]:
         `modes`, their names ("" for a run without modes); `page`, the data of a report's page
         (`reports.page.page_data`), with charts, and the film in at most 181 frames; `stress` of the film's stations;
         `numbers` and `errors` of each mode; `findings`, one line each, and `verdict`, their level.
+
+    Raises
+    ------
+    NumericalError
+        No mode has begun.
     """
-    data = found.result.data
-    if data is None:
-        return {"modes": [], "page": None, "stress": None, "numbers": [], "findings": [], "verdict": "wrong",
-                "errors": _errors(found)}  # fmt: skip
+    data = found.begun().result.data
+    assert data is not None
     dims = [dim for dim in ("mode",) if dim in data.dims]
     data = data.transpose(*dims, "time", ...)
     few = data.isel(time=frames_of(data.sizes["time"], FRAMES))

@@ -77,7 +77,7 @@ def main() -> None:
             stream.flush()
 
     warnings.simplefilter("ignore")
-    _warm_up(inbox)
+    _warm_up(inbox, send)
     # The garbage collector need not look at modules again.
     gc.collect()
     gc.freeze()
@@ -87,18 +87,25 @@ def main() -> None:
         number, request = inbox.next(number)
         send(number, {"state": BEGUN})
         if request is not None:
-            answer(request, lambda event, number=number: send(number, event), lambda number=number: inbox.number != number)
+            answer(
+                request, lambda event, number=number: send(number, event), lambda number=number: inbox.number != number
+            )
         send(number, {"state": ENDED})
 
 
-def _warm_up(inbox: Inbox) -> None:
+def _warm_up(inbox: Inbox, send: Send) -> None:
     """Import all modules and load all kernels, as far as no request waits for it."""
     from paraflex.files import library_text
+
+    def announce(event: dict[str, Any]) -> None:
+        # Kernels that are compiled now are those that a request waits for.
+        if event["state"] == "running" and "modes" not in event:
+            send(NO_REQUEST, event)
 
     for name in _WARMING:
         if inbox.number == NO_REQUEST:
             with suppress(Exception):
-                answer({"text": library_text(name)}, lambda _: None, lambda: inbox.number != NO_REQUEST, only_coarse=True)
+                answer({"text": library_text(name)}, announce, lambda: inbox.number != NO_REQUEST, only_coarse=True)
 
 
 def answer(
@@ -126,8 +133,8 @@ def answer(
 
     try:
         _answer(request, send, stale, only_coarse=only_coarse)
-    except Superseded:
-        pass
+    except (Superseded, KeyboardInterrupt):
+        return
     except (ParaflexError, MemoryError) as error:
         send({"state": "error", "error": error_of(error), "text": error_of(error)["text"]})
     except Exception as error:
@@ -172,7 +179,7 @@ def _send_results(
     event = shown(found, charts=not coarse)
     if stale():
         raise Superseded
-    accuracy = {"tolerance": found.tolerance, "samples": found.samples, "coarse": coarse}
+    accuracy = {"coarse": coarse, "tolerance": found.tolerance, "samples": found.samples}
     state = {"state": "preview" if coarse else "done", "accuracy": accuracy, "seconds": time.perf_counter() - began}
     send(state | event)
 
