@@ -14,7 +14,7 @@ import numpy as np
 import paraflex
 from paraflex.errors import InputError, printable
 from paraflex.files import ExpressionProfile, Model
-from paraflex.mechanism import Material, Mechanism, PointRef, Polynomial, Rectangle, Round, Section, Shape, Sine, Tube
+from paraflex.mechanism import Material, PointRef, Polynomial, Rectangle, Round, Section, Shape, Sine, Tube
 from .computing import model_of
 
 # Width of a line, and classes that are imported from their module because `paraflex` does not list them.

@@ -201,14 +201,16 @@ class _Process:
             self.process.kill()
 
     def _read(self) -> None:
-        assert self.process.stdout is not None
+        assert self.process.stdin is not None and self.process.stdout is not None
         with suppress(EOFError, OSError, ValueError, pickle.UnpicklingError):
             while True:
                 self._runner._taken(self, *pickle.load(self.process.stdout))
         self.process.kill()
         code = self.process.wait()
-        with suppress(OSError):
-            self.process.stdout.close()
+        for stream in (self.process.stdin, self.process.stdout):
+            # What was written to a process that has ended is lost.
+            with suppress(OSError):
+                stream.close()
         self._runner._lost(self, code)
 
 
