@@ -19,7 +19,7 @@ from paraflex.workbench import leaving
 from paraflex.workbench.computing import computed, model_of
 from paraflex.workbench.runs import Runner
 from paraflex.workbench.shown import shown
-from paraflex.workbench.worker import Superseded, answer
+from paraflex.workbench.worker import answer
 from processes import WITHIN, started, wait_until
 
 FIVE_BAR, PENDULUM = pf.library.text("five_bar"), pf.library.text("pendulum")
@@ -183,8 +183,26 @@ def test_a_killed_process_is_replaced_and_one_line_names_it(runner):
 def test_a_killed_idle_process_is_replaced_without_a_word(runner):
     assert finished(runner, FIVE_BAR)["state"] == "done"
     killed = runner._active
-    killed.kill()
+    killed.process.kill()
     wait_until(lambda: runner._active is not killed, what="the loss")
+    assert finished(runner, FIVE_BAR)["state"] == "done"
+
+
+def test_ctrl_c_in_the_terminal_of_a_notebook_ends_no_run(runner):
+    heard = run(runner, pf.library.text("3rrr"))
+    heard.last("running")
+    os.kill(runner._active.process.pid, signal.SIGINT)
+    assert heard.last("done", "error")["state"] == "done"
+
+
+def test_an_event_that_is_not_taken_ends_nothing(runner, capsys):
+    def fail(event):
+        raise ZeroDivisionError
+
+    runner.start({"text": PENDULUM}, fail)
+    assert finished(runner, FIVE_BAR)["state"] == "done"
+    runner.start({"text": "name ="}, fail)
+    wait_until(lambda: "ZeroDivisionError" in capsys.readouterr().err, what="the traceback")
     assert finished(runner, FIVE_BAR)["state"] == "done"
 
 
@@ -260,7 +278,6 @@ def test_a_stale_run_sends_no_results():
     events = []
     answer({"text": FIVE_BAR, "preview": False}, events.append, lambda: True)
     assert events == []
-    assert issubclass(Superseded, Exception)
 
 
 @pytest.mark.parametrize("name", [*pf.library.names(), "four_bars:3"])

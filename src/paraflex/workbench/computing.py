@@ -1,9 +1,8 @@
 """Runs of a model's text: its study along a path in several modes, or its own motion."""
 
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -23,15 +22,13 @@ from paraflex.integrators.options import TolerancePer
 from paraflex.mechanism import ActuationMode
 from paraflex.mechanism.masses import check_masses
 from paraflex.motion import MotionRun, state_at
-from paraflex.reduced_bodies import AUTO
 from paraflex.reduced_bodies.mechanism import reduced_task
 from paraflex.results import motion_dataset
-from paraflex.results.findings import keep_findings, verdict_of
 from paraflex.studies.tracking import StudyResult, TrackingStudy
 from paraflex.tracking import TrackingRun, TrackingTask, simulate
 
 # Tolerance of coarse runs as a part of the mechanism's size, 25 times the default, and number of their samples.
-_COARSE_TOLERANCE, COARSE_SAMPLES = 1e-3, 121
+_COARSE_TOLERANCE, _COARSE_SAMPLES = 1e-3, 121
 
 
 @dataclass(frozen=True)
@@ -63,21 +60,12 @@ class Computed(Brief):
 
 
 def model_of(text: str, folder: Path | None = None, source: str = "model") -> Model:
-    """Read a model from its text as `load` reads it from a file, without warnings.
-
-    Parameters
-    ----------
-    text : str
-        Text of the model file.
-    folder : Path, optional
-        Folder to which names of tables in the text are relative; the current one by default.
-    source : str
-        Name of the model in errors.
+    """Read a model from its text as `load` reads a file, without warnings; files it names are in the folder.
 
     Raises
     ------
     InputError
-        Text that is not a model; see `load`.
+        Text that is not a model; `source` names it.
     """
     with naming(source):
         data = with_rows(parse_toml(text), folder or Path())
@@ -97,14 +85,12 @@ def computed(
     Parameters
     ----------
     model : Model
-        Model to run.
-    modes : sequence of str
-        Actuation modes; by default those of the study.
-    path : str, optional
-        Name of a path of the model; by default that of the study.
+        Model to run. A reduction of its study is used along a path only.
+    modes, path : sequence of str, str
+        Actuation modes and path; by default those of the study.
     coarse : bool
-        Whether the runs are coarse: by the default method with a tolerance of 1/1000 of the mechanism's size if the
-        study has a finer one, and few samples.
+        Whether runs have few samples and, unless that of the study is coarser or its step fixed, a tolerance of 1/1000
+        of the mechanism's size with the default method.
     on_progress : callable, optional
         Function called with the progress in simulated seconds; a KeyboardInterrupt that it raises stops the runs.
 
@@ -114,6 +100,9 @@ def computed(
         A study that cannot be run, or whose plan fails.
     """
     check_masses(model.mechanism)
+    if coarse:
+        few = min(model.study.samples, _COARSE_SAMPLES)
+        model = replace(model, study=replace(model.study, samples=few))
     if model.paths or path is not None:
         return _along(model, modes, path, coarse=coarse, on_progress=on_progress)
     if modes:
@@ -125,35 +114,23 @@ def computed(
 def _along(
     model: Model, names: Sequence[str], path: str | None, *, coarse: bool, on_progress: OnProgress | None
 ) -> Computed:
-    name, modes, controllers = model.path_name(path), list(model.modes(names)), model.acting()
+    name, modes = model.path_name(path), list(model.modes(names))
     if not modes:
-        raise InputError(
-            "no actuation mode to run", field="modes", remedy="add a [motor.NAME], or [study] modes to the file"
-        )
-    task = model.plan(name, samples=_samples(model, coarse=coarse), warning=False)
-    options = _options(model, task.system, coarse=coarse)
-    few, full, reduction = _reduced(model, task, options, modes)
-    simulator = _Simulator(options, controllers)
+        remedy = "add a [motor.NAME], or [study] modes to the file"
+        raise InputError("no actuation mode to run", field="modes", remedy=remedy)
+    task = model.plan(name, warning=False)
+    findings = () if coarse else check_planned(model, task, name, modes, None)
+    options, reduction = _options(model, task.system, coarse=coarse), None
+    if model.study.reduced:
+        task, reduction = reduced_task(task, model.study.reduced, options.tolerance_for(task.system), modes)
+    simulator = _Simulator(options, model.acting())
+    parameters = _provenance(model, options, path=name, modes=[mode.name for mode in modes])
     study = TrackingStudy(
-        few, modes, options, _provenance(model, options, path=name, modes=[mode.name for mode in modes]), simulator,
-        model.study.error, warning=False, reduction=reduction, full=None if coarse else full,
-        findings=() if coarse else check_planned(model, task, name, modes, None),
+        task, modes, options, parameters, simulator, model.study.error, warning=False, findings=findings,
+        reduction=reduction,
     )  # fmt: skip
     result = study.run(on_progress=on_progress)
-    if result.data is not None:
-        keep_findings(result.data, verdict_of(result.data))
     return Computed(result, simulator.errors, _tolerance(options, task.system), task.motion.t.size)
-
-
-def _reduced(
-    model: Model, task: TrackingTask, options: IntegrationOptions, modes: Sequence[ActuationMode]
-) -> tuple[TrackingTask, TrackingTask | None, Any]:
-    """Return the task with the coordinates that the study keeps, that with all for comparison, and the reduction."""
-    kept = model.study.reduced
-    if not kept:
-        return task, None, None
-    few, reduction = reduced_task(task, kept, options.tolerance_for(task.system), modes)
-    return few, None if kept == AUTO else task, reduction
 
 
 class _Simulator:
@@ -161,35 +138,31 @@ class _Simulator:
 
     def __init__(self, options: IntegrationOptions, controllers: Sequence[Any]) -> None:
         self.errors: dict[str, NumericalError] = {}
-        self._simulate: Callable[..., TrackingRun] = partial(simulate, options=options, warning=False)
-        if controllers:
-            self._simulate = partial(simulate_controlled, controllers=controllers, options=options)
+        self._options, self._controllers = options, controllers
 
-    def __call__(
-        self, task: TrackingTask, mode: str | ActuationMode, *, on_progress: Callable[[float], None] | None = None
-    ) -> TrackingRun:
+    def __call__(self, task: TrackingTask, mode: str | ActuationMode, *, on_progress: Any = None) -> TrackingRun:
+        how: dict[str, Any] = {"options": self._options, "on_progress": on_progress}
         try:
-            return self._simulate(task, mode, on_progress=on_progress)
+            if self._controllers:
+                return simulate_controlled(task, mode, self._controllers, **how)
+            return simulate(task, mode, warning=False, **how)
         except NumericalError as error:
             self.errors[getattr(mode, "name", str(mode))] = error
             raise
 
 
 def _own_motion(model: Model, *, coarse: bool, on_progress: OnProgress | None) -> Computed:
-    mechanism = model.mechanism
-    study = replace(model.study, samples=_samples(model, coarse=coarse))
-    end, began = own_duration(study), time.perf_counter()
-    system = standing_system(mechanism, model.start, study.assembly)
+    study, end, began, errors = model.study, own_duration(model.study), time.perf_counter(), {}
+    system = standing_system(model.mechanism, model.start, study.assembly)
     options = _options(model, system, coarse=coarse)
-    begun = study.assembly if model.start is None else state_at(system, model.start, study.assembly, balanced=False)
+    start = study.assembly if model.start is None else state_at(system, model.start, study.assembly, balanced=False)
 
     def report(reached: float) -> None:
         if on_progress is not None:
             on_progress(Progress(reached, end, reached, time.perf_counter() - began))
 
-    errors = {}
     try:
-        run = own_run(mechanism, study, model.acting(), start=begun, options=options, on_progress=report)
+        run = own_run(model.mechanism, study, model.acting(), start=start, options=options, on_progress=report)
     except NumericalError as error:
         if not isinstance(error.partial, MotionRun):
             raise
@@ -200,12 +173,7 @@ def _own_motion(model: Model, *, coarse: bool, on_progress: OnProgress | None) -
     return Computed(result, errors, _tolerance(options, system), study.samples)
 
 
-def _samples(model: Model, *, coarse: bool) -> int:
-    return min(model.study.samples, COARSE_SAMPLES) if coarse else model.study.samples
-
-
 def _options(model: Model, system: System, *, coarse: bool) -> IntegrationOptions:
-    """Return the integration options of the study, or those of coarse runs if they allow larger errors."""
     options, loose = model.study.integration(), _COARSE_TOLERANCE * system.size
     if not coarse or options.step is not None or options.tolerance_for(system) >= loose:
         return options

@@ -19,28 +19,27 @@ OnEvent = Callable[[dict[str, Any]], None]
 _CHILD = "import sys; sys.path[:] = {path!r}; from paraflex.workbench.worker import main; main()"
 # Time after which a process that does not stop its run is replaced, and in which one ends by itself [s].
 _PATIENCE, _LEAVING = 0.3, 2.0
-# Events after which nothing more follows.
-_LAST = ("done", "error")
 
 
 class Runner:
-    """Process that runs models, kept warm, with another one that takes over if a run does not stop.
+    """Process that runs models, kept warm, with a second one that takes over if a run does not stop.
 
-    Processes end with this one, however it ends. A Runner is used from any thread, and closed at the end.
+    Both end with this process, however it ends. A Runner may be used from any thread, and is closed at the end.
 
     Parameters
     ----------
     spare : bool
-        Whether a second process is kept ready.
+        Whether there is a second process.
     """
 
     def __init__(self, *, spare: bool = True) -> None:
-        self._lock = threading.RLock()
-        self._number, self._on_event = NO_REQUEST, _ignore
+        self._lock, self._closed, self._wants_spare = threading.RLock(), False, spare
+        # The newest request, None if it is answered or cancelled.
+        self._number: int = NO_REQUEST
         self._request: dict[str, Any] | None = None
-        self._wants_spare, self._closed = spare, False
-        self._spare: _Process | None = None
+        self._on_event: OnEvent = lambda _: None
         self._active: _Process | None = _Process(self)
+        self._spare: _Process | None = None
 
     def __enter__(self) -> "Runner":
         return self
@@ -59,9 +58,9 @@ class Runner:
             sent first if they take a while.
         on_event : callable
             Function that takes each event, called from another thread. Events are dicts with `event`, "run"; `run`, the
-            number that this method returns; and `state`: "running" with `doing` and `share`, "preview" and "done" with
-            the results (`shown.shown`), their `accuracy`, and `seconds` since the start, "error" with `text`, one line,
-            and `error`, its parts, or "cancelled".
+            number of the run; and `state`: "running" with `doing` and `share`; "preview" and "done" with the results
+            (`shown.shown`), their `accuracy`, and `seconds` since the start; "error" with `text`, one line, and
+            `error`, its parts; or "cancelled".
 
         Returns
         -------
@@ -78,144 +77,86 @@ class Runner:
         with self._lock:
             if self._closed:
                 raise InputError("is closed", field="runner", remedy="make another Runner")
-            self._number += 1
-            self._on_event, self._request = on_event, {"outside": may_be_outside(), **request}
-            self._hand_over()
-            return self._number
+            self._on_event = on_event
+            return self._hand_over({"outside": may_be_outside(), **request})
 
     def cancel(self) -> None:
         """Stop the run, if there is one; its last event has the state "cancelled"."""
         with self._lock:
-            if self._request is None or self._closed:
-                return
-            number, on_event, self._request = self._number, self._on_event, None
-            self._number += 1
-            self._hand_over()
-        _deliver(on_event, number, {"state": "cancelled"})
+            number, waiting, on_event = self._number, self._request is not None, self._on_event
+            if waiting:
+                self._hand_over(None)
+        if waiting:
+            _deliver(on_event, number, {"state": "cancelled"})
 
     def close(self) -> None:
         """End the processes; a run under way sends no more events."""
         with self._lock:
             self._closed, self._request = True, None
-            self._number += 1
-            left = [one for one in (self._active, self._spare) if one is not None]
-            self._active = self._spare = None
+            left, self._active, self._spare = (self._active, self._spare), None, None
         for one in left:
-            one.close()
+            if one is not None:
+                one.close()
 
-    def _hand_over(self) -> None:
-        """Give the newest request to the process, and see to it later whether it has begun."""
+    def _hand_over(self, request: dict[str, Any] | None) -> int:
+        """Give the newest request to the process, and see to it later that it has begun; return its number."""
+        self._number, self._request = self._number + 1, request
         if self._active is None:
             self._active, self._spare = self._spare or _Process(self), None
-        self._active.send(self._number, self._request)
+        self._active.send(self._number, request)
         if self._active.running != NO_REQUEST:
-            timer = threading.Timer(_PATIENCE, self._replace, [self._number])
+            timer = threading.Timer(_PATIENCE, self._replace)
             timer.daemon = True
             timer.start()
+        return self._number
 
-    def _replace(self, number: int) -> None:
+    def _replace(self) -> None:
         """Let the spare process take over if it is ready and the other one still runs what is no longer wanted."""
         with self._lock:
             active, spare = self._active, self._spare
-            overdue = active is not None and active.running not in (NO_REQUEST, self._number)
-            if self._closed or number != self._number or not overdue or spare is None or not spare.ready:
+            if active is None or spare is None or not spare.ready or active.running in (NO_REQUEST, self._number):
                 return
-            assert active is not None
-            self._active, self._spare = spare, None
+            self._active, self._spare = spare, _Process(self)
             spare.send(self._number, self._request)
-            active.kill()
-            self._spare = _Process(self)
+            active.process.kill()
 
-    def _taken(self, process: "_Process", number: int, event: dict[str, Any]) -> None:
+    def take(self, process: "_Process", number: int, event: dict[str, Any]) -> None:
         """Take an event of a process: pass it on if it belongs to the newest request."""
+        state = event["state"]
         with self._lock:
-            state = event["state"]
             if state == READY:
                 process.ready = True
-                if self._wants_spare and self._spare is None and process is self._active and not self._closed:
-                    self._spare = _Process(self)
-                self._replace(self._number)
-                return
-            if state in (BEGUN, ENDED):
+                self._fill()
+                self._replace()
+            elif state in (BEGUN, ENDED):
                 process.running = number if state == BEGUN else NO_REQUEST
-                return
-            newest = number in (self._number, NO_REQUEST)
-            if not newest or process is not self._active or self._request is None:
+            newest = number in (self._number, NO_REQUEST) and process is self._active and self._request is not None
+            if state in (READY, BEGUN, ENDED) or not newest:
                 return
             number, on_event = self._number, self._on_event
-            if state in _LAST:
-                self._request = None
+            self._request = None if state in ("done", "error") else self._request
         _deliver(on_event, number, event)
 
-    def _lost(self, process: "_Process", code: int) -> None:
+    def lose(self, process: "_Process", code: int) -> None:
         """Replace a process that has ended by itself, and report the run that it did not finish."""
         with self._lock:
-            if process is self._spare:
-                self._spare = None
-            if process is not self._active or self._closed:
+            self._spare = None if process is self._spare else self._spare
+            if process is not self._active:
                 return
             self._active, self._spare = self._spare, None
-            if self._active is not None and self._active.ready and self._wants_spare:
-                self._spare = _Process(self)
-            if self._request is None:
-                return
-            number, on_event, self._request = self._number, self._on_event, None
+            self._fill()
+            number, waiting, on_event = self._number, self._request is not None, self._on_event
+            self._request = None
         why = f"signal {-code}: out of memory, or killed" if code < 0 else f"exit code {code}"
         text = f"the process of the run ended before it ({why}); run it again"
-        error = {"text": text, "kind": "LostWorker", "field": "", "remedy": "run it again", "time": None}
-        _deliver(on_event, number, {"state": "error", "text": text, "error": error})
+        if waiting:
+            error = {"text": text, "kind": "LostWorker", "field": "", "remedy": "run it again", "time": None}
+            _deliver(on_event, number, {"state": "error", "text": text, "error": error})
 
-
-class _Process:
-    """Process of `worker.main`, with a thread that reads its events."""
-
-    def __init__(self, runner: Runner) -> None:
-        self.ready, self.running = False, NO_REQUEST
-        self._runner = runner
-        with starting_processes():
-            command = [sys.executable, "-c", _CHILD.format(path=sys.path)]
-            self.process: subprocess.Popen[bytes] = subprocess.Popen(
-                command, stdin=subprocess.PIPE, stdout=subprocess.PIPE
-            )
-        threading.Thread(target=self._read, daemon=True, name="paraflex-runs").start()
-
-    def send(self, number: int, request: dict[str, Any] | None) -> None:
-        """Send a request; if the process has ended, the reading thread finds out."""
-        assert self.process.stdin is not None
-        with suppress(OSError, ValueError):
-            self.process.stdin.write(pickle.dumps((number, request)))
-            self.process.stdin.flush()
-
-    def kill(self) -> None:
-        """End the process at once."""
-        self.process.kill()
-
-    def close(self) -> None:
-        """Close its standard input, at which it ends."""
-        assert self.process.stdin is not None
-        with suppress(OSError, ValueError):
-            self.process.stdin.close()
-        try:
-            self.process.wait(_LEAVING)
-        except subprocess.TimeoutExpired:
-            self.process.kill()
-
-    def _read(self) -> None:
-        assert self.process.stdin is not None and self.process.stdout is not None
-        with suppress(EOFError, OSError, ValueError, pickle.UnpicklingError):
-            while True:
-                self._runner._taken(self, *pickle.load(self.process.stdout))
-        self.process.kill()
-        code = self.process.wait()
-        for stream in (self.process.stdin, self.process.stdout):
-            # What was written to a process that has ended is lost.
-            with suppress(OSError):
-                stream.close()
-        self._runner._lost(self, code)
-
-
-def _ignore(_: dict[str, Any]) -> None:
-    """Take an event of no request."""
+    def _fill(self) -> None:
+        """Start the spare process as soon as the other one is ready, which it would slow down."""
+        if self._wants_spare and self._spare is None and self._active is not None and self._active.ready:
+            self._spare = _Process(self)
 
 
 def _deliver(on_event: OnEvent, number: int, event: dict[str, Any]) -> None:
@@ -224,3 +165,41 @@ def _deliver(on_event: OnEvent, number: int, event: dict[str, Any]) -> None:
         on_event({"event": "run", "run": number, **event})
     except Exception:
         traceback.print_exc()
+
+
+class _Process:
+    """Process of `worker.main`, with a thread that reads its events."""
+
+    def __init__(self, runner: Runner) -> None:
+        self.ready, self.running, self._runner = False, NO_REQUEST, runner
+        command = [sys.executable, "-c", _CHILD.format(path=sys.path)]
+        with starting_processes():
+            self.process: Any = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE)
+        threading.Thread(target=self._read, daemon=True, name="paraflex-runs").start()
+
+    def send(self, number: int, request: dict[str, Any] | None) -> None:
+        """Send a request; if the process has ended, the reading thread finds out."""
+        with suppress(OSError, ValueError):
+            self.process.stdin.write(pickle.dumps((number, request)))
+            self.process.stdin.flush()
+
+    def close(self) -> None:
+        """Close its standard input, at which it ends."""
+        with suppress(OSError, ValueError):
+            self.process.stdin.close()
+        try:
+            self.process.wait(_LEAVING)
+        except subprocess.TimeoutExpired:
+            self.process.kill()
+
+    def _read(self) -> None:
+        with suppress(EOFError, OSError, ValueError, pickle.UnpicklingError):
+            while True:
+                self._runner.take(self, *pickle.load(self.process.stdout))
+        self.process.kill()
+        code = self.process.wait()
+        for stream in (self.process.stdin, self.process.stdout):
+            # What was written to a process that has ended is lost.
+            with suppress(OSError):
+                stream.close()
+        self._runner.lose(self, code)

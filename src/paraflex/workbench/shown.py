@@ -1,6 +1,5 @@
 """Results of runs for the page: the motion, stresses for its colours, charts, and the main numbers."""
 
-from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
@@ -8,7 +7,6 @@ import numpy as np
 import xarray as xr
 
 from paraflex.arrays import Array
-from paraflex.errors import NumericalError
 from paraflex.figures.selection import default_mode, names_of
 from paraflex.findings import DONE_STATUSES
 from paraflex.reports.film import animation, frames_of
@@ -21,7 +19,7 @@ from paraflex.results.following import headline
 from paraflex.results.numbers import finite_or_none, largest
 from .computing import Computed
 
-# Largest number of frames; step of a stress that is stored in a byte, relative to the largest, and byte of unknown ones.
+# Largest number of frames; byte of the largest stress, and that of an unknown one.
 FRAMES, _STEPS, _UNKNOWN = 181, 254, 255
 
 
@@ -62,7 +60,7 @@ def shown(found: Computed, *, charts: bool = True) -> dict[str, Any]:
         "page": page_data(page),
         "stress": station_stresses(few),
         "numbers": [_numbers(data.sel(mode=mode) if dims else data, mode) for mode in modes],
-        "errors": _errors(found),
+        "errors": [error_of(error) | {"mode": mode} for mode, error in found.errors.items()],
         "findings": finding_lines(verdict),
         "verdict": verdict.level.value,
     }
@@ -106,18 +104,14 @@ def _numbers(run: xr.Dataset, mode: str) -> dict[str, Any]:
     out: dict[str, Any] = {"mode": mode, "status": status, "message": str(run["message"].item())}
     follows = "end_effector_desired" in run
     out["error_rms"] = finite_or_none(headline(run)[0].item()) if follows else None
-    out["error_max"] = finite_or_none(run[_largest(run)].item()) if follows else None
+    largest_error = "tracking_max_motion" if run.attrs.get("error") == "motion" else "tracking_max"
+    out["error_max"] = finite_or_none(run[largest_error].item()) if follows else None
     torque = run["torque" if "torque" in run else "applied_torque"]
     out["peak_torque"] = {motor: largest(torque.sel(motor=motor).values) for motor in names_of(run, "motor")}
     out |= dict.fromkeys(("stress_max", "stress_body", "stress_place", "stress_time", "safety_factor"))
     if "stress_max" in run and status in (*DONE_STATUSES, "interrupted"):
         out |= _stress(run)
     return out
-
-
-def _largest(run: xr.Dataset) -> str:
-    """Return the metric of the largest error over the time span that ranks the runs."""
-    return "tracking_max_motion" if run.attrs.get("error") == "motion" else "tracking_max"
 
 
 def _stress(run: xr.Dataset) -> dict[str, Any]:
@@ -134,16 +128,13 @@ def _stress(run: xr.Dataset) -> dict[str, Any]:
     }  # fmt: skip
 
 
-def _errors(found: Computed) -> list[dict[str, Any]]:
-    """Return the failures of modes; of those that could not start there is nothing else."""
-    return [error_of(error) | {"mode": mode} for mode, error in found.errors.items()]
-
-
 def error_of(error: Exception) -> dict[str, Any]:
-    """Return an error for the page: its line, its type, and the field or the time that it names."""
-    out: dict[str, Any] = {"text": str(error) or type(error).__name__, "kind": type(error).__name__}
-    names: Mapping[str, Any] = {name: getattr(error, name, None) for name in ("field", "value", "remedy")}
-    out |= {"field": names["field"] or "", "remedy": names["remedy"] or "", "time": None}
-    if isinstance(error, NumericalError) and error.moment is not None:
-        out["time"] = finite_or_none(error.moment.time)
-    return out
+    """Return an error for the page: its line, its type, and the field, the remedy and the time that it names."""
+    moment = getattr(error, "moment", None)
+    return {
+        "text": str(error) or type(error).__name__,
+        "kind": type(error).__name__,
+        "field": getattr(error, "field", ""),
+        "remedy": getattr(error, "remedy", ""),
+        "time": None if moment is None else finite_or_none(moment.time),
+    }
