@@ -1,7 +1,7 @@
 """Actions that add members to a mechanism."""
 
 from collections.abc import Callable, Mapping, Sequence
-from math import cos, degrees, floor, hypot, log10, pi, sin
+from math import cos, floor, hypot, log10, pi, sin
 from typing import Any
 
 from paraflex.driven.ranges import freedoms_at

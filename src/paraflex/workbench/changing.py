@@ -124,7 +124,7 @@ def _doubled(sheet: Sheet, action: Action, image: Callable[[Pose], Pose], *, mir
     """Add the image of members under new names."""
     before, named = sheet, [thing_of(sheet.data, name) for name in action.get("names") or ()]
     bodies = [str(thing[1]) for thing in named if thing[0] == "body"]
-    if not named or not bodies and not any(thing[0] == GROUND for thing in named):
+    if not named or (not bodies and not any(thing[0] == GROUND for thing in named)):
         raise InputError("nothing to copy", field="names", value=action.get("names"), remedy="choose bodies or points")
     refs = {use.text for use in uses(sheet.data) if use.kind == "ref" and use.place[0] == "joint"
             and any(each.place[:2] == use.place[:2] and each.text.partition(".")[0] in bodies for each in uses(sheet.data)

@@ -81,7 +81,7 @@ def thing_of(data: Mapping[str, Any], name: Any) -> Place:
         place = tuple(name)
     else:
         head, _, rest = str(name).partition(".")
-        if rest and head not in ModelTable.model_fields or (head == "body" and "body" in data.get("body", {})):
+        if (rest and head not in ModelTable.model_fields) or (head == "body" and "body" in data.get("body", {})):
             place: Place = ("body", head, "points", rest)
         else:
             place = (head, rest) if rest else (head,)
@@ -166,7 +166,7 @@ def _ref(text: str, thing: Place, name: str) -> str | None:
     body, _, point = text.partition(".")
     if thing == ("body", body):
         return f"{name}.{point}"
-    if thing == (GROUND, point) and body == GROUND or thing == ("body", body, "points", point):
+    if (thing == (GROUND, point) and body == GROUND) or thing == ("body", body, "points", point):
         return f"{body}.{name}"
     return None
 

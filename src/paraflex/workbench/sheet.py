@@ -9,8 +9,7 @@ from typing import Any
 
 from paraflex.dynamics import closure_of, reference_pose, standing_system
 from paraflex.errors import InputError, NumericalError, suggestion
-from paraflex.expressions.evaluate import evaluate_parameters, expressed_in
-from paraflex.expressions.evaluate import evaluate as evaluate_text
+from paraflex.expressions.evaluate import evaluate as evaluate_text, evaluate_parameters, expressed_in
 from paraflex.files.fields import value_at
 from paraflex.files.model import Model, model_from
 from paraflex.files.read import parse_toml
