@@ -8,7 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from paraflex.arrays import Array
+from paraflex.actuation import actuation_condition, required_effort
+from paraflex.arrays import Array, ArrayLike, Mask
 from paraflex.dynamics import System, build_system, natural_frequencies, undeformed
 from paraflex.dynamics.joint_coordinates import joint_rows
 from paraflex.dynamics.linearise import LOWEST, compliance
@@ -19,11 +20,11 @@ from paraflex.errors import InputError, NumericalError, ParaflexError
 from paraflex.files import Model
 from paraflex.mechanism import Mechanism
 from paraflex.paths import Path
-from paraflex.paths.closure import PathClosure, follow_path
+from paraflex.paths.closure import PathClosure, RigidMotion, follow_path
 
 # Singular values below this fraction of the largest count as zero; frequencies that are shown.
 _DEPENDENT, _SHOWN = 1e-9, 3
-# Relative singular value below which a position counts as near a singular one, and numbers of places of a path
+# Ratio of singular values below which a position counts as near a singular one, and numbers of places of a path
 # that is followed, and of one that leaves the reach.
 NEAR, _PLACES, _SEARCHED = 0.05, 120, 40
 _NOT, _NEAR, _WELL = 0, 2, 1
@@ -198,7 +199,7 @@ class Seeing:
         return out
 
     def _path(self, mode: str) -> list[list[float]]:
-        """Return the places of the study's path and whether they are reached; empty without a path that can be tried."""
+        """Return the places of the study's path and whether they are reached; empty if it cannot be tried."""
         if self._mechanism.end_effector is None or not self._model.paths:
             return []
         name = self._model.path_name()
@@ -214,19 +215,22 @@ class Seeing:
         with suppress(ParaflexError):
             times = np.linspace(0.0, path.duration, _PLACES)
             motion = follow_path(self._model.mechanism, path, times, assembly=assembly, orientation=orientation)
-            return [self._place(path, t, q, mode) for t, q in zip(times, motion.q, strict=True)]
+            return _places(path, times, np.where(self._near(motion, mode), _NEAR, _WELL))
         closure = PathClosure(self._model.mechanism.rigid(), orientation, path.duration)
         times = np.linspace(0.0, path.duration, _SEARCHED)
         found = closure.reach.tracked(times, closure.target(path, times)[:, 0], closure.assembled(assembly))
-        return [self._place(path, t, None if one.part else one.q, mode) for t, one in zip(times, found, strict=True)]
+        return _places(path, times, [_NOT if one.part else _WELL for one in found])
 
-    def _place(self, path: Path, t: float, q: Array | None, mode: str) -> list[float]:
-        x, y = path.evaluate(np.array([t])).position[0]
-        if q is None:
-            return [float(x), float(y), _NOT]
-        numbers = {} if self.massless or self._drives else self._singular(q, self._motors(mode))
-        near = [one for one in numbers.values() if one is not None]
-        return [float(x), float(y), _NEAR if near and min(near) < NEAR else _WELL]
+    def _near(self, motion: RigidMotion, mode: str) -> Mask:
+        """Return where the motors of a mode are near a singular position along a motion (k,)."""
+        chosen = next((one for one in self._model.mechanism.modes if one.name == mode), None)
+        if chosen is None or self.massless:
+            return np.zeros(motion.t.size, dtype=bool)
+        return actuation_condition(required_effort(motion), chosen) > 1.0 / NEAR
+
+
+def _places(path: Path, times: Array, reach: ArrayLike) -> list[list[float]]:
+    return np.column_stack([path.evaluate(times).position, reach]).tolist()
 
 
 def _rank(rows: Array) -> int:
