@@ -41,11 +41,12 @@ def loaded(text, folder):
 def kept_lines(text, other):
     """Lines of a text whose tables and values another text has as well, and its comments, each with its line break."""
     data, compared = tomllib.loads(text), tomllib.loads(other)
+    headers = [entry.place for entry in entries_of(other) if entry.kind == "header"]
     lines = text.splitlines(keepends=True)
     kept = {k for k, line in enumerate(lines) if line.strip().startswith("#")}
     for entry in entries_of(text):
         same = value_at(data, entry.place) == value_at(compared, entry.place)
-        if entry.kind == "pair" and same or entry.kind == "header" and value_at(compared, entry.place) is not None:
+        if entry.kind == "pair" and same or entry.kind == "header" and entry.place in headers:
             start = text.count("\n", 0, entry.whole[0])
             kept |= set(range(start, start + max(1, text[slice(*entry.whole)].count("\n"))))
     return [lines[k] for k in sorted(kept)]
