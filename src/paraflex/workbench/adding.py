@@ -1,7 +1,7 @@
 """Actions that add members to a mechanism."""
 
 from collections.abc import Callable, Mapping, Sequence
-from math import cos, degrees, floor, hypot, log10, pi, sin
+from math import cos, floor, hypot, log10, pi, sin
 from typing import Any
 
 from paraflex.driven.ranges import freedoms_at
@@ -99,7 +99,9 @@ def add_slider(sheet: Sheet, action: Action) -> Done:
         rail, sheet = f"{GROUND}.{point}", sheet.put(("ground", point), tidy(place))
     if action.get("block", True) is False:
         if not pinned:
-            raise InputError("a slot holds the point of a link", field="at", value=at, remedy="choose a point of a link")
+            raise InputError(
+                "a slot holds the point of a link", field="at", value=at, remedy="choose a point of a link"
+            )
         return add_joint(sheet, {"type": "slot", "a": rail, "b": at, "direction": along, "assembly": shown})
     body = sheet.free_name(action, "body", "slider")
     pin = str(at).partition(".")[2] if pinned else rail.partition(".")[2]
@@ -190,7 +192,9 @@ def add_spring(sheet: Sheet, action: Action) -> Done:
 
 def add_damper(sheet: Sheet, action: Action) -> Done:
     """Add a damper at a joint."""
-    return _member(sheet, action, "damper", {"joint": action.get("joint"), "coefficient": action.get("coefficient", 0.1)})
+    return _member(
+        sheet, action, "damper", {"joint": action.get("joint"), "coefficient": action.get("coefficient", 0.1)}
+    )
 
 
 def add_load(sheet: Sheet, action: Action) -> Done:
@@ -337,7 +341,7 @@ def _free_joint(sheet: Sheet, action: Action, a: str, b: str) -> str:
 
 
 def _known(sheet: Sheet, action: Action, table: str) -> str:
-    name = action.get(table)
+    name: Any = action.get(table)
     known(name, sheet.names(table), table, table)
     return str(name)
 

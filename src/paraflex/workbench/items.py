@@ -29,7 +29,7 @@ def outline(text: str) -> list[dict[str, Any]]:
     What names a joint belongs to it (motor, spring, sensor), and so does to a body what names a point of it or the body.
     """
     data = Sheet(text).data
-    named: dict[tuple[str, str], list[list[Any]]] = {}
+    named: dict[tuple[str, ...], list[list[Any]]] = {}
     for use in uses(data):
         owner = list(use.place[: 1 if use.place[0] in ("end_effector", "study") else 2])
         for thing in _things(use.kind, use.text, use.place):
@@ -94,7 +94,12 @@ def _rows(sheet: Sheet, place: Place, value: Any, label: str) -> Iterator[dict[s
     if isinstance(value, dict):
         for key, each in value.items():
             yield from _rows(sheet, (*place, key), each, f"{label}.{key}".lstrip("."))
-    elif isinstance(value, list) and len(value) <= 3 and value and not any(isinstance(each, list | dict) for each in value):
+    elif (
+        isinstance(value, list)
+        and len(value) <= 3
+        and value
+        and not any(isinstance(each, list | dict) for each in value)
+    ):
         for k, _ in enumerate(value):
             yield _row(sheet, (*place, k), f"{label} {'xy'[k] if _is_pair(sheet, place, value) else k + 1}".strip())
     else:
@@ -142,7 +147,11 @@ def _choices(data: Mapping[str, Any], place: Place, annotation: Any) -> list[Any
         return list(TASK_COORDINATES)
     if (keys[0] == "joint" or keys[-1] in ("point", "reaction")) and not takes_number(annotation):
         bodies = {name: body.get("points", {}) for name, body in data.get("body", {}).items()}
-        return [f"{body}.{point}" for body, points in {"ground": data.get("ground", {}), **bodies}.items() for point in points]
+        return [
+            f"{body}.{point}"
+            for body, points in {"ground": data.get("ground", {}), **bodies}.items()
+            for point in points
+        ]
     if len(keys) < 2 or not table or takes_number(annotation):
         return [True, False] if annotation is bool else None
     return list(data.get(table, {}))
