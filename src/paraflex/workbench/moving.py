@@ -1,6 +1,6 @@
 """Pose of a mechanism that is dragged by hand: it follows the mouse as closed loops, and stays in its assembly."""
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -30,7 +30,7 @@ from paraflex.mechanism.masses import with_any_masses
 from paraflex.mechanism.poses import local_points
 from paraflex.mechanism.quantities import known
 from paraflex.paths.loops import LoopClosure
-from .branches import MARGIN, Branches, Guard
+from .branches import MARGIN, NO_SIGN, Branches, Guard
 from .dragging import REACHED, Dragging
 
 # Longest step of the target [sizes of the mechanism], their largest number, and iterations for a step and at the end.
@@ -39,8 +39,9 @@ _STEP, _MOST_STEPS, _ON_THE_WAY, _AT_THE_END = 0.1, 24, 4, 60
 _FAR = 20.0
 # Distance between poses that are remembered, and their number.
 _APART, _REMEMBERED = 0.02, 500
-# Elbows with a smaller sine are named where a drag stops; slopes of the distance below this belong to limits of reach.
-_NAMED, _LEVEL = 1e-2, 1e-2
+# Elbows with a smaller sine are named where a drag stops, slopes of the distance below this belong to limits of reach,
+# and so many elbows are named.
+_NAMED, _LEVEL, _LISTED = 1e-2, 1e-2, 3
 # Joints at which freedoms are held have independent coordinates, to this singular value.
 _INDEPENDENT = 1e-6
 _PARALLEL = "the drives {} cannot hold it: parallel singular position (type II)"
@@ -70,8 +71,9 @@ class Moved(NamedTuple):
 
 @dataclass
 class _Drag:
-    """One drag: its algebra, the target before, and poses that it has passed."""
+    """One drag: its body and algebra, the target before, and poses that it has passed."""
 
+    body: str
     dragging: Dragging
     target: Array
     determined: bool
@@ -241,12 +243,18 @@ class Mover:
         if old is not None and old.dragging.at == at and np.array_equal(old.dragging.local, point):
             return old
         drag = Dragging(self.system, self.loops.signals, self.freedoms, at, point, [])
-        determined = self.freedoms == 2 and self._guide(body) is None
-        drag.guards.extend(self._guards(body, drag, determined=determined))
+        place, guide, own = drag.place(self.q), self._guide(body), list[Guard]()
+        if self.freedoms == 1 and guide is not None:
+            own = [self._determinant((body, guide.name), self._branches.joint_rows([guide.name]))]
+        elif self.freedoms == 2 and guide is None:
+            found = self._determinant((body, str(point)), drag.rows)
+            # A point that two freedoms move along a line is not determined by its place.
+            own = [found] if found.sign or abs(found.value(self.q)) > NO_SIGN else []
+        determined = self.freedoms == 2 and bool(own)
+        drag.guards.extend([*self._lasting(chains=determined), *own])
         for guard in drag.guards:
             guard.begin(self.q)
-        place = drag.place(self.q)
-        self._drag = _Drag(drag, place, determined, [(place, self.q)])
+        self._drag = _Drag(body, drag, place, determined, [(place, self.q)])
         return self._drag
 
     def _guide(self, body: str) -> Joint | None:
@@ -254,24 +262,18 @@ class Mover:
         found = [one for one in self._rigid.joints_at[body] if one.moves and GROUND in (one.a.body, one.b.body)]
         return found[0] if found else None
 
-    def _guards(self, body: str, drag: Dragging, *, determined: bool) -> list[Guard]:
-        """Return what keeps its sign as a point of a body is dragged; signs last as long as the assembly."""
-        own, guide = self._signs, self._guide(body)
-        guards = self._elbow_guards(chains=determined) if self.freedoms else []
+    def _lasting(self, *, chains: bool) -> list[Guard]:
+        """Return what keeps its sign whichever body is dragged: elbows, and the drives' determinant."""
+        found = self._branches.guarded_elbows(chains=chains) if self.freedoms else []
+        guards = [self._signs.setdefault(("", guard.text), guard) for guard in found]
         if self.drives:
-            guards.append(self._drive_guard)
-        limit = f"limit of reach of {body}"
-        if self.freedoms == 1 and guide is not None:
-            rows = self._branches.joint_rows([guide.name])
-            guards.append(own.setdefault((body, guide.name), self._branches.determinant(rows, limit)))
-        elif determined:
-            guards.append(own.setdefault((body, str(drag.local)), self._branches.determinant(drag.rows, limit)))
+            rows = self._branches.joint_rows(self.drives)
+            guards.append(self._determinant(("", "drives"), rows, _PARALLEL.format(listed(self.drives))))
         return guards
 
-    def _elbow_guards(self, *, chains: bool) -> list[Guard]:
-        found = self._branches.guarded_elbows(chains=chains)
-        return [self._signs.setdefault(("", guard.text), guard) for guard in found]
-
+    def _determinant(self, name: tuple[str, str], rows: Callable[[Array], Array], text: str = "") -> Guard:
+        """Return the guard of a determinant, with the sign it had before in this assembly."""
+        return self._signs.setdefault(name, self._branches.determinant(rows, text))
 
     @property
     def drives(self) -> list[str]:
@@ -283,13 +285,6 @@ class Mover:
                 return joints
         return []
 
-    @property
-    def _drive_guard(self) -> Guard:
-        text = _PARALLEL.format(listed(self.drives))
-        return self._signs.setdefault(
-            ("", "drives"), self._branches.determinant(self._branches.joint_rows(self.drives), text)
-        )
-
     def _stop(self, here: _Drag, q: Array, goal: Array) -> tuple[str, str]:
         """Return what holds a point back from its target, and a sentence on it."""
         drag = here.dragging
@@ -300,10 +295,10 @@ class Mover:
         if not near and not lost:
             return "", ""
         in_line = [one.text for one in self._branches.elbows if abs(np.sin(q[one.b] - q[one.a] + one.offset)) < _NAMED]
-        texts = dict.fromkeys([guard.text for guard in near] + in_line)
+        texts = dict.fromkeys([guard.text for guard in near if guard.text] + in_line)
         stop = "singular" if near and falling else "reach"
-        own = "singular position" if stop == "singular" else "limit of reach"
-        return stop, f"{own}: {listed([*texts])}" if texts else own
+        own = "singular position" if stop == "singular" else f"limit of reach of {here.body}"
+        return stop, f"{own}: {listed([*texts], _LISTED)}" if texts else own
 
     @property
     def _usual(self) -> tuple[Array, Array]:
@@ -346,13 +341,13 @@ def _held(mover: Mover, hold: str) -> Mechanism:
         return _with_held(mover, mover.drives)
     if effector is not None and not effector.point.on_ground and mover.freedoms in (2, 3):
         place = marker_position(mover.system, mover.system.marker(effector.point), mover.q)
-        pin = PointRef(GROUND, "held._point")
+        pin = PointRef(GROUND, "held_point")
         ground = {**rigid.ground, pin.point: (float(place[0]), float(place[1]))}
         angle = float(material_angle(mover.system, effector.point, mover.q[None])[0])
         more = (
-            RevoluteJoint("held._joint", pin, effector.point)
+            RevoluteJoint("held_joint", pin, effector.point)
             if mover.freedoms == 2
-            else WeldJoint("held._joint", pin, effector.point, angle)
+            else WeldJoint("held_joint", pin, effector.point, angle)
         )
         return replace(rigid, ground=ground, joints=(*rigid.joints, more))
     grounded = [one.name for one in rigid.joints if one.moves and GROUND in (one.a.body, one.b.body)]
