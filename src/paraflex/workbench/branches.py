@@ -152,21 +152,15 @@ class Branches:
         """Return the elbow at a joint; None if a body is no link there."""
         if joint.holds != ("points",) or joint.a.on_ground or joint.b.on_ground or joint.a.body == joint.b.body:
             return None
-        arms = [self._arm(joint, ref) for ref in (joint.a, joint.b)]
-        if arms[0] is None or arms[1] is None:
+        first, second = self._arm(joint, joint.a), self._arm(joint, joint.b)
+        if first is None or second is None:
             return None
-        (one, along), (other, beside) = arms
+        (one, along), (other, beside) = first, second
         a, b = (self.system.body(ref.body).angle for ref in (joint.a, joint.b))
-        square = along != beside
-        text = (
-            f"{joint.b.body} square to the slide of {joint.a.body}"
-            if beside < along
-            else (
-                f"{joint.a.body} square to the slide of {joint.b.body}"
-                if square
-                else f"{joint.a.body} and {joint.b.body} in line"
-            )
-        )
+        text = f"{joint.a.body} and {joint.b.body} in line"
+        if along != beside:
+            link, slide = (joint.b, joint.a) if along else (joint.a, joint.b)
+            text = f"{link.body} square to the slide of {slide.body}"
         return Elbow(joint.name, a, b, other - one, text)
 
     def _arm(self, joint: Joint, ref: PointRef) -> tuple[float, bool] | None:

@@ -10,7 +10,7 @@ import scipy
 from paraflex.arrays import Array
 from paraflex.dynamics import System
 from paraflex.kernel.constraints import constraint_values
-from paraflex.kernel.packed import Signals, make_scratch
+from paraflex.kernel.packed import Scratch, Signals, make_scratch
 from .branches import Guard
 
 # Longest and shortest step, and step of the finite differences for second derivatives [sizes of the mechanism, rad].
@@ -140,8 +140,13 @@ class Dragging:
         return None
 
     @cached_property
-    def _scratch(self) -> tuple[Array, Array, Array, Array]:
-        return make_scratch(self.system.packed), np.zeros(self.system.n), *np.zeros((2, self.system.m))
+    def _scratch(self) -> tuple[Scratch, Array, Array, Array]:
+        return (
+            make_scratch(self.system.packed),
+            np.zeros(self.system.n),
+            np.zeros(self.system.m),
+            np.zeros(self.system.m),
+        )
 
     def _residual(self, q: Array) -> Array:
         scratch, still, phi, rate = self._scratch

@@ -10,22 +10,14 @@ from paraflex.arrays import Array
 from paraflex.driven.assemblies import poses_of
 from paraflex.driven.exact import NO_TASKS
 from paraflex.driven.ranges import JointDrive
-from paraflex.dynamics import material_angle, reference_pose
+from paraflex.dynamics import material_angle
 from paraflex.dynamics.joint_coordinates import joint_rows, joint_value
 from paraflex.dynamics.points import marker_position
 from paraflex.dynamics.projection import assemble, closed, constraint_change
 from paraflex.dynamics.soundness import mobility
 from paraflex.dynamics.state import State
-from paraflex.errors import InputError, NumericalError, listed
-from paraflex.mechanism import (
-    GROUND,
-    ConstantSpeed,
-    Joint,
-    Mechanism,
-    PointRef,
-    RevoluteJoint,
-    WeldJoint,
-)
+from paraflex.errors import InputError, listed
+from paraflex.mechanism import GROUND, ConstantSpeed, Joint, Mechanism, PointRef, RevoluteJoint, WeldJoint
 from paraflex.mechanism.masses import with_any_masses
 from paraflex.mechanism.poses import local_points
 from paraflex.mechanism.quantities import known
