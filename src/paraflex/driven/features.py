@@ -231,7 +231,7 @@ def _couplers(motion: ExactMotion) -> Iterator[tuple[str, str, PointRef, PointRe
 
 
 def transmission_angles(motion: ExactMotion, q: Array) -> list[tuple[str, str, Array]]:
-    """Return the transmission angles (k,) at poses (k, n) [rad], each with its joint and coupler: see `Transmission`."""
+    """Return the transmission angles (k,) at poses (k, n) [rad], with joints and couplers: see `Transmission`."""
     return [(joint, coupler, 0.5 * math.pi - np.abs(pressure(q))) for joint, coupler, pressure in _pressures(motion)]
 
 

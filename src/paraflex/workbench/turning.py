@@ -1,4 +1,4 @@
-"""Full turn of a crank, or motion along a path, as plain data for the page: frames, curves, and features with values."""
+"""Full turn of a crank, or motion along a path, as plain data for the page: frames, curves, features."""
 
 from collections.abc import Iterator
 from dataclasses import asdict
