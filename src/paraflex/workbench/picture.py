@@ -7,6 +7,7 @@ import numpy as np
 
 from paraflex.arrays import Array
 from paraflex.mechanism import GROUND, Body, LumpedMass, Mechanism, PointRef
+from paraflex.mechanism.poses import Pose, local_points
 from paraflex.plots.marks import LOOKS, moving_marks, still_marks
 from paraflex.plots.model_drawing import posed_scene
 from paraflex.plots.model_marks import acting_arrows, sensor_marks
@@ -43,6 +44,7 @@ def picture(shown: Posed, view: Limits | None = None) -> dict[str, Any]:
         "open": dict(shown.gaps),
         "problems": list(shown.problems),
         "angles": {name: round(angle, 9) for name, angle in shown.angles.items()},
+        "frames": {body.name: _frame(shown, body) for body in mechanism.bodies},
     }
 
 
@@ -79,6 +81,14 @@ def _marks(shown: Posed, scene: Scene, limits: Limits) -> list[list[Any]]:
         moving += [["moving", "sensor", mark.name, _line(mark.place[None])]]
         moving += [["moving", "sensor", "", _line(mark.arrow.line)], ["moving", "sensor", "", _line(mark.arrow.head)]]
     return still + moving
+
+
+def _frame(shown: Posed, body: Body) -> list[float]:
+    """Return origin and angle of a body's frame."""
+    point, (x, y) = next(iter(local_points(body).items()))
+    angle, place = shown.angles.get(body.name, 0.0), shown.place(PointRef(body.name, point))
+    turned = Pose(angle, (0.0, 0.0)).place_of((x, y))
+    return [*_pair(place - np.array(turned)), round(angle, 9)]
 
 
 def _lumps(body: Body) -> Sequence[LumpedMass]:

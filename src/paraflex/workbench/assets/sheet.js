@@ -13,7 +13,8 @@ export class Sheet {
     this.centre = [0, 0.15];
     this.scale = 1200; // px/m
     this.stands = new Map();
-    this.under = []; // functions (pen, sheet) that paint below the mechanism, and above it
+    this.behind = []; // functions (pen, sheet) that paint below the grid, below the mechanism, and above it
+    this.under = [];
     this.over = [];
     this.picture = null; // a picture that stands in for that of the state, as while a run is played
     this.frames = 0;
@@ -54,7 +55,12 @@ export class Sheet {
     const shown = this.bench.state.picture;
     this.fitting = true;
     if (!this.width) return;
-    const [x0, y0, x1, y1] = shown?.limits ?? [-0.25, -0.1, 0.25, 0.3];
+    this.show(shown?.limits ?? [-0.25, -0.1, 0.25, 0.3], true);
+  }
+
+  // Show a part of the plane.
+  show([x0, y0, x1, y1], fitting = false) {
+    this.fitting = fitting;
     this.scale = 0.86 * Math.min(this.width / (x1 - x0), (this.height - 60) / (y1 - y0));
     this.centre = [(x0 + x1) / 2, (y0 + y1) / 2];
     this.seen();
@@ -85,8 +91,8 @@ export class Sheet {
     this.repaint();
     clearTimeout(this.asking);
     this.asking = setTimeout(async () => {
-      const { picture } = await this.bench.link.ask("view", { limits: this.limits });
-      this.bench.state.picture = picture;
+      const { revision } = this.bench.state, found = await this.bench.link.ask("view", { limits: this.limits }).catch(() => null);
+      if (found && revision === this.bench.state.revision) this.bench.state.picture = found.picture;
       this.repaint();
     }, 60);
   }
@@ -103,6 +109,7 @@ export class Sheet {
     this.frames++;
     pen.clearRect(0, 0, this.width, this.height);
     pen.lineCap = pen.lineJoin = "round";
+    for (const layer of this.behind) this.layer(layer);
     if (this.grid) this.paintGrid();
     for (const layer of this.under) this.layer(layer);
     if (this.shown) this.paintMechanism(this.shown);
