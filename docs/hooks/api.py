@@ -73,6 +73,7 @@ PACKAGES = (
     "designs.derivatives.gradient",
     "studies",
     "studies.report",
+    "workbench.notebook",
     "campaign",
     "engines",
     "errors",

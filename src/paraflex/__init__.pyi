@@ -186,6 +186,7 @@ from .designs.measure import metrics as metrics
 from .results.export import export as export
 from .plots.film import FilmOptions as FilmOptions, animate as animate
 from .studies.report import report as report
+from .workbench.notebook import edit as edit
 
 # Errors and warnings
 from .errors import (

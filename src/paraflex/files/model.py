@@ -381,6 +381,11 @@ def model_of_text(text: str, source: str, folder: FilePath) -> Model:
     return model_from(_parsed(text, source, folder, {}), source, text)
 
 
+def text_of_model(model: Model | Mechanism) -> str:
+    """Return the text of the file from which `load` reads the same model; see `Model.save`."""
+    return _read(model)[0]
+
+
 def _parsed(text: str, source: str, folder: FilePath, settings: Mapping[str, Any]) -> dict[str, Any]:
     with naming(source):
         return with_rows(with_values(parse_toml(text), settings), folder, list(settings.values()))

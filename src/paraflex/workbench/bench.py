@@ -24,11 +24,15 @@ class Bench:
         self._view: Limits | None = None
         self.renew()
 
+    def read(self) -> Model:
+        """Return the model of the text; InputError if it cannot be read."""
+        return model_of_text(self._document.text, self._document.name, self._document.folder)
+
     def renew(self) -> None:
         """Read the text again; the last pose stays if it cannot be read."""
         self.problem = None
         try:
-            self.model = model_of_text(self._document.text, self._document.name, self._document.folder)
+            self.model = self.read()
             self.shown = posed(self.model.mechanism, self.model.study.assembly)
         except ParaflexError as error:
             self.problem = error

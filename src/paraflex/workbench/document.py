@@ -22,6 +22,8 @@ class Document:
     ----------
     source : str, optional
         File, which need not exist yet, or name of a library mechanism; an empty sheet by default.
+    text : str, optional
+        Text of a model without a file, in place of a source.
     drafts : Path, optional
         Folder of drafts; by default that of the user's state.
 
@@ -31,15 +33,17 @@ class Document:
         File that cannot be read, or a name of neither a file nor a library mechanism.
     """
 
-    def __init__(self, source: str | None = None, *, drafts: Path | None = None) -> None:
-        self.file, text = _opened(source)
+    def __init__(self, source: str | None = None, *, text: str | None = None, drafts: Path | None = None) -> None:
+        self.file, text = _opened(source) if text is None else (None, text)
         self.name: str = source or "untitled"
         self.folder: Path = Path() if self.file is None else self.file.parent
         self._steps, self._now, self._on_disk = [text], 0, text if self.file is not None else None
         self._stamp = self._stamped()
         folder = _drafts() if drafts is None else drafts
         self._draft = folder / f"{hashlib.sha256(str(self._identity()).encode()).hexdigest()[:20]}.toml"
-        self.recovered: bool = self._recover()
+        # Sheets without a name have no drafts: two of them would share one.
+        self._has_draft = source is not None
+        self.recovered: bool = self._has_draft and self._recover()
 
     @property
     def text(self) -> str:
@@ -120,10 +124,13 @@ class Document:
         return True
 
     def _named(self, name: str) -> Path:
-        file = (self.folder / name).resolve()
-        if file.suffix != ".toml" or not file.stem:
-            raise InputError("not the name of a model file", field="file", value=name, remedy="end it in .toml")
-        if exists(file) and (self.file is None or file != self.file.resolve()):
+        """Return the file of a name that a page gave: in the folder of the model or below it, and not there yet."""
+        file = Path(name)
+        if file.suffix != ".toml" or not name.isprintable() or file.is_absolute() or ".." in file.parts:
+            remedy = f"a file in {self.folder.resolve()} or below it, which ends in .toml"
+            raise InputError("not the name of a model file", field="file", value=name[:100], remedy=remedy)
+        file = self.folder / file
+        if exists(file) and (self.file is None or file.resolve() != self.file.resolve()):
             raise InputError("already there", field="file", value=str(file), remedy="choose another name")
         return file
 
@@ -141,6 +148,8 @@ class Document:
     def _keep(self) -> None:
         """Write the draft, or delete it if the file has its text; a folder that cannot be written means no draft."""
         with suppress(OSError, OutputError):
+            if not self._has_draft:
+                return
             if self.saved:
                 self._draft.unlink(missing_ok=True)
             else:

@@ -47,6 +47,7 @@ class Host:
         self._place: str = f"/{secrets.token_urlsafe(18)}"
         self._pages: dict[WebSocket, asyncio.Queue[dict[str, Any]]] = {}
         self._loop: asyncio.AbstractEventLoop | None = None
+        self._opened = False
         self._context = copy_context()
         # One thread for all messages: they are answered in their order.
         self._worker = ThreadPoolExecutor(1, thread_name_prefix="workbench")
@@ -116,7 +117,7 @@ class Host:
             return
         await page.accept()
         replies: asyncio.Queue[dict[str, Any]] = asyncio.Queue()
-        self._pages[page] = replies
+        self._pages[page], self._opened = replies, True
         sending = asyncio.create_task(_send_all(page, replies))
         try:
             while True:
@@ -152,11 +153,11 @@ class Host:
         watching.cancel()
 
     async def _watch(self) -> None:
-        seen, alone = False, 0.0
+        alone = 0.0
         while True:
             await asyncio.sleep(_LOOK)
-            seen, alone = seen or bool(self._pages), 0.0 if self._pages else alone + _LOOK
-            if seen and alone > _ALONE:
+            alone = 0.0 if self._pages else alone + _LOOK
+            if self._opened and alone > _ALONE:
                 self.end()
             await asyncio.get_running_loop().run_in_executor(self._worker, self.session.take_up)
 

@@ -62,6 +62,4 @@ def _document(model: Model | Mechanism | str | Path | None) -> Document:
         return Document(None if model is None else str(model))
     from paraflex.files.model import text_of_model
 
-    document = Document(None)
-    document.begin(text_of_model(model), getattr(model, "name", ""))
-    return document
+    return Document(text=text_of_model(model))

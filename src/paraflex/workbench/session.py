@@ -1,6 +1,7 @@
 """Answers to the messages of a page: the text and its history, the pose, and what is computed of both."""
 
 import threading
+import traceback
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -46,6 +47,11 @@ class Session:
                 return {"id": number, "ok": finite(getattr(self, known[asked])(message))}
         except ParaflexError as error:
             return {"id": number, "error": described(error)}
+        except Exception as error:
+            # No message may end the page; this is a fault of paraflex, whose trace goes to the terminal.
+            traceback.print_exc()
+            text = f"a fault of paraflex itself ({type(error).__name__}); the text is as it was"
+            return {"id": number, "error": {"text": text, "field": "", "remedy": ""}}
 
     def take_up(self) -> None:
         """Take up a file that another program has changed."""
