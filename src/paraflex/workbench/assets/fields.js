@@ -21,11 +21,8 @@ export class Fields {
     const { selected, state } = this.bench;
     if (selected.length > 1) return [];
     if (!selected.length) return [["parameters"]];
-    const [chosen] = selected, joint = chosen.kind === "joint" && (state.picture?.joints ?? []).find(([name]) => name === chosen.name);
-    const further = joint ? [["motor", joint[4]], ["prescribed", joint[5]]].filter(([, name]) => name) : [];
-    const at = (state.outline ?? []).filter(({ on }) => on && on === `${chosen.kind}.${chosen.name}`).map(({ place }) => place);
-    const known = new Set(further.map(String));
-    return [this.bench.placeOf(chosen), ...further, ...at.filter((one) => !known.has(String(one)))];
+    const [chosen] = selected, own = chosen.kind === "joint" ? this.bench.owned(chosen) : [];
+    return [this.bench.placeOf(chosen), ...own.filter(([kind]) => kind !== "body" && kind !== "joint")];
   }
 
   async refresh() {

@@ -618,8 +618,8 @@ export class Tools {
 
   paintLabel(pen, text, x, y, angle) {
     pen.font = "600 12.5px system-ui, sans-serif"; pen.textBaseline = "middle"; pen.textAlign = "center";
-    const wide = pen.measureText(text).width / 2 + 6, side = wide * Math.abs(Math.sin(angle)) + 16;
-    const cx = x + side * Math.abs(Math.sin(angle)), cy = y - 16 * Math.abs(Math.cos(angle));
+    const wide = pen.measureText(text).width / 2 + 6, s = Math.sin(angle), c = Math.cos(angle), up = c < 0 ? 1 : -1;
+    const off = wide * Math.abs(s) + 10 * Math.abs(c) + 8, cx = x + up * off * s, cy = y + up * off * c;
     pen.globalAlpha = 0.92; pen.fillStyle = this.sheet.colour("card"); pen.fillRect(cx - wide, cy - 10, 2 * wide, 20);
     pen.globalAlpha = 1; pen.fillStyle = this.sheet.colour("accent"); pen.fillText(text, cx, cy + 0.5);
   }

@@ -155,17 +155,19 @@ class Workbench {
   // Select what a text such as "body.link1", "ground.A" or "end_effector" names.
   selectNamed(text) {
     const [kind, ...rest] = text.split("."), name = rest.join(".");
-    const chosen = kind === "ground" ? { kind: "point", name: text } : { kind, name };
+    const ofBody = (this.state.picture?.bodies ?? []).some(([body]) => body === kind) && name;
+    const chosen = kind === "ground" || ofBody ? { kind: "point", name: text } : { kind, name };
     if (this.exists(chosen.kind, chosen.name)) this.select(chosen);
   }
 
   // Place in the file, and name in messages, of something selected.
   placeOf({ kind, name }) {
-    if (kind !== "point") return name ? [kind, name] : [kind];
+    if (kind !== "point") return name && name !== kind ? [kind, name] : [kind];
     const [body, point] = name.split(".");
     return body === "ground" ? ["ground", point] : ["body", body, "points", point];
   }
   nameOf(chosen) { return chosen.kind === "point" ? chosen.name : this.placeOf(chosen).join("."); }
+  owned({ kind, name }) { return (this.state.outline ?? []).find((one) => one.kind === kind && one.name === name)?.owns ?? []; }
 
   // Go to a place in the file: select what stands there, and its field.
   goTo(place) {
@@ -250,7 +252,7 @@ class Workbench {
     const found = await this.request("goes", { names });
     if (!found) return;
     const go = () => this.act({ kind: "delete", names });
-    const more = found.goes.filter((one) => !names.includes(one)).map((one) => one.replace(/\./, " "));
+    const more = found.goes.map((one) => one.name ?? one).filter((one) => !names.includes(one)).map((one) => one.replace(/\./, " "));
     if (!more.length) go();
     else this.ask(`deletes ${listed(more)} as well`, go, "Delete");
   }
