@@ -137,7 +137,7 @@ class Row {
     const listen = (what, does) => this.input.addEventListener(what, does);
     listen("change", () => this.commit());
     listen("keydown", (event) => this.key(event));
-    const label = element("span", { class: "label", title: field.help ?? "" }, field.label);
+    const label = element("span", { class: "label", title: field.help ?? "" }, /^\d$/.test(field.label) ? `point ${field.label}` : field.label);
     const remove = field.optional ? button("×", `Remove ${field.label}`, () => this.remove(), { class: "icon small" }) : null;
     this.box = element("label", { class: "field", title: field.help ?? "" }, label, this.input, element("span", { class: "unit" }, field.unit ?? ""), remove, this.value, this.wrong);
     if (slides && Number.isFinite(field.value) && PLAIN.test(field.text)) this.addSlider(field);

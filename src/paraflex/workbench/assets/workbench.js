@@ -155,6 +155,7 @@ class Workbench {
   // Select what a text such as "body.link1", "ground.A" or "end_effector" names.
   selectNamed(text) {
     const [kind, ...rest] = text.split("."), name = rest.join(".");
+    if (kind === "parameters") return;
     const ofBody = (this.state.picture?.bodies ?? []).some(([body]) => body === kind) && name;
     const chosen = kind === "ground" || ofBody ? { kind: "point", name: text } : { kind, name };
     if (this.exists(chosen.kind, chosen.name)) this.select(chosen);
