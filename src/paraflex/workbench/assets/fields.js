@@ -53,9 +53,10 @@ export class Fields {
   head() {
     const { bench } = this, { selected } = bench;
     if (!selected.length) return [element("p", { class: "soft" }, "Nothing is selected. Parameters of the file:")];
-    const act = element("div", { class: "row" },
+    const drawn = selected.some(({ kind }) => kind === "body" || kind === "point"), on = (made) => (drawn ? made : "");
+    const act = element("div", { class: "row" }, ...[
       button("Copy", "Copy (Ctrl+D)", () => bench.copy()), button("Mirror ⇋", "Mirror at the vertical through the origin", () => bench.mirror("y")),
-      button("Mirror ⥮", "Mirror at the horizontal through the origin", () => bench.mirror("x")), button("Delete", "Delete (Del)", () => bench.remove(), { class: "danger" }));
+      button("Mirror ⥮", "Mirror at the horizontal through the origin", () => bench.mirror("x"))].map(on), button("Delete", "Delete (Del)", () => bench.remove(), { class: "danger" }));
     if (selected.length > 1) return [element("h2", {}, `${selected.length} things are selected`), element("p", { class: "soft" }, selected.map((one) => bench.nameOf(one)).join(", ")), act];
     return [this.naming(selected[0]), act];
   }
@@ -100,7 +101,7 @@ export class Fields {
       this.rows.push(row);
       part.append(row.box);
     }
-    if (error) part.append(element("p", { class: "wrong" }, error.text ?? String(error)));
+    if (error && !slides) part.append(element("p", { class: "wrong" }, error.text ?? String(error)));
     if (slides) part.append(this.newParameter(fields));
     else if (more?.length) part.append(this.adder(place, more));
     return part;

@@ -54,8 +54,8 @@ export class Outline {
 
   fresh(table, stem) {
     const taken = new Set((this.bench.state.outline ?? []).filter(({ kind }) => kind === table).map(({ name }) => name));
-    let k = table === "parameters" ? 1 : 0;
-    while (taken.has(k ? `${stem}${k}` : stem)) k++;
-    return k ? `${stem}${k}` : stem;
+    let k = 1;
+    while (taken.has(k > 1 || table === "parameters" ? `${stem}${k}` : stem)) k++;
+    return k > 1 || table === "parameters" ? `${stem}${k}` : stem;
   }
 }

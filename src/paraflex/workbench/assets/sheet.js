@@ -1,5 +1,6 @@
 import { element } from "./elements.js";
 import { alongLine, placeNames } from "./names.js";
+import { Places } from "./places.js";
 
 // The sheet: a canvas with the mechanism in metres, moved and scaled by the person, and layers that others paint over it.
 const LEAST = 1e-5, MOST = 1e4; // width of the view [m]
@@ -12,6 +13,7 @@ export class Sheet {
     this.pen = this.canvas.getContext("2d");
     this.centre = [0, 0.15];
     this.scale = 1200; // px/m
+    this.places = new Places(this);
     this.stands = new Map();
     this.behind = []; // functions (pen, sheet) that paint below the grid, below the mechanism, and above it
     this.under = [];

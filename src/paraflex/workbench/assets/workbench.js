@@ -268,7 +268,7 @@ class Workbench {
   }
 
   nudge([dx, dy]) {
-    const point = this.selected.length === 1 && this.tools.pointOf(this.selected[0]);
+    const point = this.selected.length === 1 && this.sheet.places.pointOf(this.selected[0]);
     if (!point) return false;
     const [ref, x, y] = point, { step } = this.sheet;
     this.act({ kind: "move-point", ref, to: [x + dx * step, y + dy * step] });
