@@ -1,10 +1,12 @@
 """Values of messages from a page, which may hold anything, and numbers that JSON can hold."""
 
 import math
+from collections.abc import Sequence
 from typing import Any, TypeVar
 
-from paraflex.errors import InputError
+from paraflex.errors import InputError, ParaflexError
 
+Message = dict[str, Any]
 T = TypeVar("T")
 _KINDS = {str: "a text", dict: "a table", list: "a list", bool: "true or false", int: "a whole number"}
 
@@ -22,7 +24,9 @@ def field(message: Any, name: str, kind: type[T]) -> T:
     found = message.get(name)
     if not isinstance(found, kind) or (isinstance(found, bool) and kind is not bool):
         value = str(found)[:60]
-        raise InputError(f"is not {_KINDS.get(kind, kind.__name__)}", field=name, value=value, remedy="load the page again")
+        raise InputError(
+            f"is not {_KINDS.get(kind, kind.__name__)}", field=name, value=value, remedy="load the page again"
+        )
     return found
 
 
@@ -30,8 +34,17 @@ def numbers(message: Any, name: str, count: int) -> list[float]:
     """Return a field of a message that is a list of finite numbers; see `field` for the errors."""
     found = field(message, name, list)
     if len(found) != count or not all(isinstance(one, int | float) and math.isfinite(one) for one in found):
-        raise InputError(f"is not {count} finite numbers", field=name, value=str(found)[:60], remedy="load the page again")
+        raise InputError(
+            f"is not {count} finite numbers", field=name, value=str(found)[:60], remedy="load the page again"
+        )
     return [float(one) for one in found]
+
+
+def one_of(value: str, choices: Sequence[str]) -> str:
+    """Return a word of a message that is one of the choices; InputError otherwise."""
+    if value not in choices:
+        raise InputError("unknown", field="what", value=value[:60], remedy=f"choose from {', '.join(choices)}")
+    return value
 
 
 def finite(value: Any) -> Any:
@@ -43,3 +56,9 @@ def finite(value: Any) -> Any:
     if hasattr(value, "tolist"):
         return finite(value.tolist())
     return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
+def described(error: ParaflexError) -> Message:
+    """Return an error for the page: its line, the field at fault and the remedy."""
+    text = " ".join(str(error).split())
+    return {"text": text, "field": getattr(error, "field", ""), "remedy": getattr(error, "remedy", "")}
