@@ -1,7 +1,7 @@
 """Actions that add members to a mechanism."""
 
 from collections.abc import Callable, Mapping, Sequence
-from math import cos, degrees, floor, hypot, log10, pi, sin
+from math import cos, floor, hypot, log10, pi, sin
 from typing import Any
 
 from paraflex.driven.ranges import freedoms_at
@@ -341,7 +341,7 @@ def _free_joint(sheet: Sheet, action: Action, a: str, b: str) -> str:
 
 
 def _known(sheet: Sheet, action: Action, table: str) -> str:
-    name = action.get(table)
+    name: Any = action.get(table)
     known(name, sheet.names(table), table, table)
     return str(name)
 

@@ -9,17 +9,16 @@ from typing import Any
 
 from paraflex.dynamics import closure_of, reference_pose, standing_system
 from paraflex.errors import InputError, NumericalError, suggestion
-from paraflex.expressions.evaluate import evaluate_parameters, expressed_in
-from paraflex.expressions.evaluate import evaluate as evaluate_text
+from paraflex.expressions.evaluate import evaluate as evaluate_text, evaluate_parameters, expressed_in
 from paraflex.files.fields import value_at
 from paraflex.files.model import Model, model_from
-from paraflex.files.read import parse_toml
 from paraflex.files.rows import with_rows
 from paraflex.mechanism import Assembly, Joint, Mechanism, PointRef
 from paraflex.mechanism.joints import GROUND
 from paraflex.mechanism.masses import with_any_masses
 from paraflex.mechanism.poses import Pose, approximate_poses, local_points, placed_poses
 from .edits import with_item, with_table, with_value, without, written
+from .spans import data_of
 
 XY = tuple[float, float]
 Action = Mapping[str, Any]
@@ -37,7 +36,7 @@ class Sheet:
     @cached_property
     def data(self) -> dict[str, Any]:
         """Parsed data of the text."""
-        return parse_toml(self.text)
+        return data_of(self.text)
 
     @cached_property
     def model(self) -> Model:
