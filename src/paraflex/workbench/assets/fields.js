@@ -31,7 +31,7 @@ export class Fields {
     do {
       this.again = false;
       const places = this.places();
-      const found = await Promise.all(places.map((place) => this.bench.link.ask("fields", { place }).catch((error) => ({ fields: [], more: [], error }))));
+      const found = await Promise.all(places.map((place) => this.bench.link.ask("fields", { place }).catch((error) => ({ fields: [], error }))));
       if (!this.again) this.show(places, found);
     } while (this.again);
     this.asking = false;
@@ -39,7 +39,7 @@ export class Fields {
 
   // Rows stay while their fields do, so that nobody loses the place where they type.
   show(places, found) {
-    const keys = JSON.stringify([places, found.map(({ fields, more }) => [fields.map(({ place, choices }) => [place, choices]), (more ?? []).map(({ label }) => label)]), this.bench.selected]);
+    const keys = JSON.stringify([places, found.map(({ fields, addable: more }) => [fields.map(({ place, choices }) => [place, choices]), (more ?? []).map(({ label }) => label)]), this.bench.selected]);
     if (keys === this.keys) {
       this.rows.forEach((row, k) => row.update(found.flatMap(({ fields }) => fields)[k]));
       return;
@@ -90,7 +90,7 @@ export class Fields {
     setTimeout(() => found()?.input.focus(), 150);
   }
 
-  section(place, { fields, more, error }, number) {
+  section(place, { fields, addable: more, error }, number) {
     const slides = place[0] === "parameters", part = element("section", {});
     if (number) {
       const [kind, name] = place;

@@ -109,6 +109,7 @@ export class Tools {
   goReady() {
     const { place, action } = this.bench.state.ready ?? {};
     const tool = String(action?.kind ?? action ?? "").replace(/^(add|set)-/, "").replace("joint", "revolute");
+    if (action === "run") { this.bench.motion?.run?.(); return; }
     if (TOOLS.has(tool)) this.choose(tool);
     if (place?.length) this.bench.goTo(place);
   }
