@@ -9,6 +9,7 @@ from paraflex.errors import InputError, NumericalError, ParaflexError
 from paraflex.files import Model
 from paraflex.files.library import library_text
 from paraflex.files.model import model_of_text
+from paraflex.mechanism.checks import check_connected, loose_bodies
 from paraflex.mechanism.quantities import known
 from paraflex.plots.scene import Limits
 from paraflex.plots.svg import sketch
@@ -16,7 +17,7 @@ from paraflex.results.posed import Posed, posed, posed_at
 from .document import Document
 from .messages import Message, described
 from .moving import Mover, assemblies
-from .picture import picture
+from .picture import ground_picture, picture
 from .readiness import readiness
 from .seeing import Seeing
 
@@ -53,6 +54,10 @@ class Bench:
 
     def renew(self) -> None:
         """Read the text again; the picture stays if it cannot be read, and the pose is near the one before."""
+        with loose_bodies():
+            self._renew()
+
+    def _renew(self) -> None:
         self.problem = None
         try:
             model = self.read()
@@ -66,6 +71,10 @@ class Bench:
         if self.mode not in [mode.name for mode in model.mechanism.modes]:
             self.mode = next(iter(model.study.modes), next((one.name for one in model.mechanism.modes), ""))
         self._pose(model)
+        try:
+            check_connected(model.mechanism)
+        except InputError as error:
+            self.problem = self.problem or error
 
     def _pose(self, model: Model) -> None:
         """Move to the pose nearest to the present one in the changed mechanism; open loops are drawn as given."""
@@ -115,7 +124,9 @@ class Bench:
         if self._mover is not None and self.model is not None:
             shown = posed_at(self.model.mechanism, self._mover.system, self._assembly, self._mover.q[None])
             return picture(shown, self._view)
-        return None if self._open is None else picture(self._open, self._view)
+        if self._open is not None:
+            return picture(self._open, self._view)
+        return ground_picture(self._document.text, self._view) if self.model is None else None
 
     def seen(self, *, quick: bool = False) -> dict[str, Any] | None:
         """Return the numbers of the pose, those that are computed fast or all; None without a pose."""

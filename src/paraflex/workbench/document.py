@@ -66,10 +66,12 @@ class Document:
         """Whether a step was taken back."""
         return self._now + 1 < len(self._steps)
 
-    def change(self, text: str) -> None:
-        """Make a text the next step of the history; one that does not differ is no step."""
+    def change(self, text: str, *, same: bool = False) -> None:
+        """Make a text the next step of the history, or the same one again; one that does not differ is no step."""
         if text == self.text:
             return
+        if same and self._now:
+            self._now -= 1
         self._steps[self._now + 1 :] = [text]
         self._now += 1
         while len(self._steps) > 2 and (len(self._steps) > _STEPS or sum(map(len, self._steps)) > _LETTERS):

@@ -8,7 +8,10 @@ from string import Template
 from paraflex.plots.themes import THEMES
 
 # Modules in the order in which they are joined; each imports only from those before it.
-_MODULES = ("elements.js", "colours.js", "link.js", "names.js", "sheet.js", "workbench.js")
+_MODULES = (
+    "elements.js", "colours.js", "link.js", "names.js", "places.js", "sheet.js", "icons.js", "dragging.js", "drawing.js", "painting.js",
+    "tools.js", "fields.js", "outline.js", "text.js", "photograph.js", "start.js", "workbench.js",
+)  # fmt: skip
 _IMPORT = re.compile(r"^import .*?;\n", re.MULTILINE | re.DOTALL)
 _EXPORT = re.compile(r"^export (?!default)", re.MULTILINE)
 

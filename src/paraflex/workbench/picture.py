@@ -7,14 +7,18 @@ import numpy as np
 
 from paraflex.arrays import Array, Numbers
 from paraflex.mechanism import GROUND, Body, LumpedMass, Mechanism, PointRef
-from paraflex.plots.marks import LOOKS, moving_marks, still_marks
+from paraflex.mechanism.poses import Pose, local_points
+from paraflex.plots.marks import LOOKS, moving_marks, still_marks, support
 from paraflex.plots.model_drawing import posed_scene
 from paraflex.plots.model_marks import acting_arrows, sensor_marks
 from paraflex.plots.scene import Limits, Scene, is_plate
 from paraflex.results.posed import Posed
+from .sheet import Sheet
 
 # Digits behind the point of a position on the page [m].
 _DIGITS = 7
+# Margin around the points of a sheet without bodies [m].
+_AROUND = 0.15
 
 
 def picture(shown: Posed, view: Limits | None = None) -> dict[str, Any]:
@@ -43,7 +47,31 @@ def picture(shown: Posed, view: Limits | None = None) -> dict[str, Any]:
         "open": dict(shown.gaps),
         "problems": list(shown.problems),
         "angles": {name: round(angle, 9) for name, angle in shown.angles.items()},
+        "frames": {body.name: _frame(shown, body) for body in mechanism.bodies},
     }
+
+
+def ground_picture(text: str, view: Limits | None = None) -> dict[str, Any] | None:
+    """Return the points of the ground of a file without bodies; None if it has none."""
+    try:
+        sheet = Sheet(text)
+        ground = {name: sheet.place(f"{GROUND}.{name}", "") for name in sheet.names("ground")}
+    except ParaflexError:
+        return None
+    if not ground:
+        return None
+    xs, ys = zip(*ground.values(), strict=True)
+    limits = Limits(min(xs) - _AROUND, max(xs) + _AROUND, min(ys) - _AROUND, max(ys) + _AROUND)
+    marks = []
+    for place in ground.values():
+        lines, strokes = support(np.array(place), view or limits)
+        marks += [["still", "ground", "", _line(line)] for line in lines]
+        marks += [["still", "hatching", "", _line(line)] for line in strokes]
+    return {
+        "limits": [limits.left, limits.bottom, limits.right, limits.top], "bodies": [], "marks": marks,
+        "points": [[f"{GROUND}.{name}", *_pair(np.array(place))] for name, place in ground.items()], "joints": [],
+        "effector": None, "lumps": [], "path": [], "open": {}, "problems": [], "angles": {}, "frames": {},
+    }  # fmt: skip
 
 
 def all_points(mechanism: Mechanism) -> Iterable[PointRef]:
@@ -79,6 +107,14 @@ def _marks(shown: Posed, scene: Scene, limits: Limits) -> list[list[Any]]:
         moving += [["moving", "sensor", mark.name, _line(mark.place[None])]]
         moving += [["moving", "sensor", "", _line(mark.arrow.line)], ["moving", "sensor", "", _line(mark.arrow.head)]]
     return still + moving
+
+
+def _frame(shown: Posed, body: Body) -> list[float]:
+    """Return origin and angle of a body's frame."""
+    point, (x, y) = next(iter(local_points(body).items()))
+    angle, place = shown.angles.get(body.name, 0.0), shown.place(PointRef(body.name, point))
+    turned = Pose(angle, (0.0, 0.0)).place_of((x, y))
+    return [*_pair(place - np.array(turned)), round(angle, 9)]
 
 
 def _lumps(body: Body) -> Sequence[LumpedMass]:
