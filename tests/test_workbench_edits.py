@@ -473,6 +473,16 @@ def test_deleting_names_what_depends_and_keeps_the_rest_in_place():
         apply(text, {"kind": "delete", "names": ["section.bar"]})
 
 
+def test_links_that_would_hang_on_nothing_go_as_well():
+    text = drawn(CHAIN)
+    assert [one["name"] for one in what_goes(text, ["joint.B"])][2:4] == ["body.link2", "end_effector"]
+    # Without its joint on the ground the chain is whole, and stays where it is.
+    free = apply(text, {"kind": "delete", "names": ["joint.A"]}).text
+    assert Sheet(free).place("link2.C", "drawn") == pytest.approx((0.4, 0.05), abs=1e-5)
+    joined = apply(free, {"kind": "add-joint", "a": "ground.A", "b": "link1.A"}).text
+    assert "points" not in tomllib.loads(joined)["assembly"]["drawn"]
+
+
 def test_names_change_in_references_expressions_and_keys():
     text = library_file("slider_crank_flexible").read_text(encoding="utf-8")
     new = apply(text, {"kind": "rename", "of": "parameters", "name": "crank", "to": "throw"}).text

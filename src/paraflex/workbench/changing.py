@@ -23,6 +23,8 @@ def set_value(sheet: Sheet, action: Action) -> Done:
     before, place = sheet, _place(action)
     sheet = _in_full(sheet, place)
     _check_place(sheet.data, place)
+    if isinstance(action.get("value"), Mapping) and value_at(sheet.data, place) is None and len(place) <= 2:
+        return placed(before, sheet.table([str(key) for key in place], action["value"], exact=True)), spelt(place)
     if "value" in action:
         text = written(action["value"], exact=True)
     else:
