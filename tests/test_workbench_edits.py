@@ -62,9 +62,8 @@ def check_minimal(old, new):
     gone = [line for line in before if comment.match(line)]
     for line in (line for line in after if comment.match(line)):
         gone.remove(line)
-    gone_tables = [
-        one for one in entries_of(old) if one.kind == "header" and value_at(tomllib.loads(new), one.place) is None
-    ]
+    data = tomllib.loads(new)
+    gone_tables = [one for one in entries_of(old) if one.kind == "header" and value_at(data, one.place) is None]
     assert len(gone) <= 4 * len(gone_tables)
     # Of a line that has changed, the part outside of the changed values stays.
     found = places_of(new)
