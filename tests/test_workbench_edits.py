@@ -62,9 +62,8 @@ def check_minimal(old, new):
     gone = [line for line in before if comment.match(line)]
     for line in (line for line in after if comment.match(line)):
         gone.remove(line)
-    gone_tables = [
-        one for one in entries_of(old) if one.kind == "header" and value_at(tomllib.loads(new), one.place) is None
-    ]
+    data = tomllib.loads(new)
+    gone_tables = [one for one in entries_of(old) if one.kind == "header" and value_at(data, one.place) is None]
     assert len(gone) <= 4 * len(gone_tables)
     # Of a line that has changed, the part outside of the changed values stays.
     found = places_of(new)
@@ -471,6 +470,16 @@ def test_deleting_names_what_depends_and_keeps_the_rest_in_place():
     assert after.place("link3.C", "drawn") == pytest.approx(before.place("link3.C", "drawn"), abs=1e-6)
     with pytest.raises(InputError, match=r"is used by body\.link1"):
         apply(text, {"kind": "delete", "names": ["section.bar"]})
+
+
+def test_links_that_would_hang_on_nothing_go_as_well():
+    text = drawn(CHAIN)
+    assert [one["name"] for one in what_goes(text, ["joint.B"])][2:4] == ["body.link2", "end_effector"]
+    # Without its joint on the ground the chain is whole, and stays where it is.
+    free = apply(text, {"kind": "delete", "names": ["joint.A"]}).text
+    assert Sheet(free).place("link2.C", "drawn") == pytest.approx((0.4, 0.05), abs=1e-5)
+    joined = apply(free, {"kind": "add-joint", "a": "ground.A", "b": "link1.A"}).text
+    assert "points" not in tomllib.loads(joined)["assembly"]["drawn"]
 
 
 def test_names_change_in_references_expressions_and_keys():

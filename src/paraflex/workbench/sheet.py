@@ -106,10 +106,15 @@ class Sheet:
         return chosen if chosen in self.names("assembly") else next(iter(self.names("assembly")), "")
 
     @cached_property
-    def frames(self) -> dict[str, dict[str, Pose]]:
-        """Poses of the body frames in each assembly, loops closed where they can be."""
-        found = self.mechanism
-        return {one.name: _frames(found, one) for one in found.assemblies} if found else {}
+    def _known_frames(self) -> dict[str, dict[str, Pose]]:
+        return {}
+
+    def frames(self, assembly: str) -> dict[str, Pose]:
+        """Return the poses of the body frames in an assembly, loops closed where they can be."""
+        if assembly not in self._known_frames:
+            found = [one for one in self.mechanism.assemblies if one.name == assembly] if self.mechanism else []
+            self._known_frames[assembly] = _frames(self.model.mechanism, found[0]) if found else {}
+        return self._known_frames[assembly]
 
     @cached_property
     def locals(self) -> dict[str, Mapping[str, XY]]:
@@ -127,7 +132,7 @@ class Sheet:
 
     def frame(self, body: str, assembly: str) -> "Frame":
         """Return the pose of a body in an assembly; an error if it is not known."""
-        found = self.frames.get(assembly, {}).get(body)
+        found = self.frames(assembly).get(body)
         if found is None or found.position is None:
             raise self.problem or InputError(
                 "its place is not known", field=f"body.{body}", remedy="give its angle in an assembly"
@@ -153,7 +158,7 @@ class Sheet:
 
     def angle(self, body: str, assembly: str) -> float:
         """Return the angle of a body in an assembly [rad]; zero for the ground."""
-        frame = self.frames.get(assembly, {}).get(body)
+        frame = self.frames(assembly).get(body)
         return 0.0 if frame is None else frame.angle
 
     def with_text(self, text: str) -> "Sheet":
@@ -224,13 +229,11 @@ def placed(before: Sheet, after: Sheet, frames: Mapping[str, Mapping[str, Pose]]
     """
     known = before.unplaced()
     for assembly, bodies in after.unplaced().items():
-        poses = {**before.frames.get(assembly, {}), **(frames or {}).get(assembly, {})}
-        for body in after.locals:
+        for body in [name for name in after.locals if name in bodies - known.get(assembly, set())]:
+            pose = (frames or {}).get(assembly, {}).get(body) or before.frames(assembly).get(body)
+            point, local = next(iter(after.locals[body].items()), ("", (0.0, 0.0)))
             # A body that is placed may determine the place of the next one.
-            if body not in bodies - known.get(assembly, set()) or body not in after.unplaced()[assembly]:
-                continue
-            pose, (point, local) = poses.get(body), next(iter(after.locals[body].items()), ("", (0.0, 0.0)))
-            if point and pose is not None and pose.position is not None:
+            if point and pose is not None and pose.position is not None and body in after.unplaced()[assembly]:
                 after = after.put(("assembly", assembly, "points", f"{body}.{point}"), tidy(pose.place_of(local)))
     return after
 
