@@ -1,6 +1,7 @@
 """Sheet: the text of a model file that may still be incomplete, with its numbers and the poses that it describes."""
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from functools import cached_property
 from math import atan2, hypot, pi
@@ -207,6 +208,20 @@ class Sheet:
 
 # Sheet after an action, and what is selected on it then: "body.link1" or the like.
 Done = tuple[Sheet, str]
+
+
+@contextmanager
+def refusals(sheet: Sheet, field: str) -> Iterator[None]:
+    """Provide a context whose errors are all `InputError`: of what is asked for, or of the text if it is no model."""
+    try:
+        yield
+    except InputError:
+        raise
+    except NumericalError as error:
+        raise InputError(error.problem, field=field, remedy=error.remedy) from None
+    except (TypeError, ValueError, LookupError, AttributeError, ArithmeticError) as error:
+        problem = f"cannot be done as given ({type(error).__name__}: {error})"
+        raise sheet.problem or InputError(problem, field=field, remedy="check the names and numbers given") from error
 
 
 def check_name(name: Any, names: Iterable[str], field: str) -> None:
