@@ -5,6 +5,7 @@ import math
 import random
 import re
 import tomllib
+from contextlib import suppress
 
 import pytest
 
@@ -308,6 +309,34 @@ def test_messages_of_nonsense_are_refused_in_one_line():
             new = outcome(text, {"kind": hand.choice(kinds), **chosen})
             if new is not None:
                 assert Sheet(new).problem is None, chosen
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "",
+        "body = 3\njoint = []\n",
+        'name = "x"\n[joint]\nA = 3\n[motor]\nm = [1]\n[body.b]\ntype = "rigid"\npoints = 3\n',
+        'name = "x"\n[assembly]\na = 3\n[study]\nmodes = 3\n[ground]\nA = [1]\n[mode]\na = 3\n',
+        'name = "x"\n[body.b]\npoints = { A = "q" }\n[joint]\nA = ["ground", "b"]\n[parameters]\nq = "q"\n',
+    ],
+)
+def test_texts_that_are_no_models_are_refused_in_one_line(text):
+    known = {
+        "ground": {"A": 0},
+        "body": {"b": {"points": {"A": 0}}},
+        "joint": {"A": 1},
+        "motor": {"m": 1},
+        "study": {"x": 1},
+    }
+    hand = Hand(3)
+    for _ in range(80):
+        outcome(text, hand.action(known))
+    for place in ([], ["body"], ["joint"], ["motor", "m"], ["ground", "A"], ["body", "b"]):
+        with suppress(InputError):
+            fields(text, place)
+    with suppress(InputError):
+        outline(text)
 
 
 def test_text_that_is_not_toml_is_refused_with_its_line_and_column():

@@ -1,9 +1,9 @@
 """Sheet: the text of a model file that may still be incomplete, with its numbers and the poses that it describes."""
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import suppress
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
-from functools import cached_property, lru_cache
+from functools import cached_property
 from math import atan2, hypot, pi
 from pathlib import Path
 from typing import Any
@@ -11,7 +11,7 @@ from typing import Any
 from paraflex.dynamics import closure_of, reference_pose, standing_system
 from paraflex.errors import InputError, NumericalError, suggestion
 from paraflex.expressions.evaluate import evaluate as evaluate_text, evaluate_parameters, expressed_in
-from paraflex.files.fields import leaves, value_at
+from paraflex.files.fields import value_at
 from paraflex.files.model import Model, model_from
 from paraflex.files.rows import with_rows
 from paraflex.mechanism import Assembly, Joint, Mechanism, PointRef
@@ -35,8 +35,6 @@ class Frame(Pose):
         return self.position
 
 
-# Longest text that may name a file.
-_NAME_LETTERS = 255
 # Stands in for the bodies of a sheet without any, so that the rest of the file is read and checked.
 _NO_BODY = {"body": {"none": {"type": "rigid", "points": {"none": [0.0, 0.0]}}}}
 
@@ -62,7 +60,11 @@ class Sheet:
         InputError
             See `paraflex.load`; a sheet without bodies, which cannot be loaded, is read as if it had one.
         """
-        return _model(self.text, self.folder, _written_at(self.data, self.folder))
+        data = with_rows(self.data, self.folder)
+        empty = not data.get("body")
+        return model_from(
+            {key: each for key, each in data.items() if key != "assembly"} | _NO_BODY if empty else data, ""
+        )
 
     @cached_property
     def problem(self) -> InputError | None:
@@ -208,25 +210,18 @@ class Sheet:
 Done = tuple[Sheet, str]
 
 
-@lru_cache(maxsize=4)
-def _model(text: str, folder: Path, _: tuple[str, ...]) -> Model:
-    """Return the model of a text and of files named in it as they were written last: an action reads two texts."""
-    data = with_rows(data_of(text), folder)
-    empty = not data.get("body")
-    return model_from(
-        {key: each for key, each in data.items() if key != "assembly"} | _NO_BODY if empty else data, "", text
-    )
-
-
-def _written_at(data: Any, folder: Path) -> tuple[str, ...]:
-    """Return when the files were written that texts in data may name."""
-    found = []
-    for _, value in leaves(data):
-        if isinstance(value, str) and "." in value and len(value) < _NAME_LETTERS:
-            with suppress(OSError, ValueError):
-                state = (folder / value).stat()
-                found.append(f"{value} {state.st_mtime_ns} {state.st_size}")
-    return tuple(found)
+@contextmanager
+def refusals(sheet: Sheet, field: str) -> Iterator[None]:
+    """Provide a context whose errors are all `InputError`: of what is asked for, or of the text if it is no model."""
+    try:
+        yield
+    except InputError:
+        raise
+    except NumericalError as error:
+        raise InputError(error.problem, field=field, remedy=error.remedy) from None
+    except (TypeError, ValueError, LookupError, AttributeError, ArithmeticError) as error:
+        problem = f"cannot be done as given ({type(error).__name__}: {error})"
+        raise sheet.problem or InputError(problem, field=field, remedy="check the names and numbers given") from error
 
 
 def check_name(name: Any, names: Iterable[str], field: str) -> None:
