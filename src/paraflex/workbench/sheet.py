@@ -2,8 +2,9 @@
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from contextlib import suppress
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 from math import atan2, hypot, pi
 from pathlib import Path
 from typing import Any
@@ -11,7 +12,7 @@ from typing import Any
 from paraflex.dynamics import closure_of, reference_pose, standing_system
 from paraflex.errors import InputError, NumericalError, suggestion
 from paraflex.expressions.evaluate import evaluate as evaluate_text, evaluate_parameters, expressed_in
-from paraflex.files.fields import value_at
+from paraflex.files.fields import leaves, value_at
 from paraflex.files.model import Model, model_from
 from paraflex.files.rows import with_rows
 from paraflex.mechanism import Assembly, Joint, Mechanism, PointRef
@@ -35,6 +36,8 @@ class Frame(Pose):
         return self.position
 
 
+# Longest text that may name a file.
+_NAME_LETTERS = 255
 # Stands in for the bodies of a sheet without any, so that the rest of the file is read and checked.
 _NO_BODY = {"body": {"none": {"type": "rigid", "points": {"none": [0.0, 0.0]}}}}
 
@@ -60,11 +63,7 @@ class Sheet:
         InputError
             See `paraflex.load`; a sheet without bodies, which cannot be loaded, is read as if it had one.
         """
-        data = with_rows(self.data, self.folder)
-        empty = not data.get("body")
-        return model_from(
-            {key: each for key, each in data.items() if key != "assembly"} | _NO_BODY if empty else data, ""
-        )
+        return _model(self.text, self.folder, _written_at(self.data, self.folder))
 
     @cached_property
     def problem(self) -> InputError | None:
@@ -222,6 +221,27 @@ def refusals(sheet: Sheet, field: str) -> Iterator[None]:
     except (TypeError, ValueError, LookupError, AttributeError, ArithmeticError) as error:
         problem = f"cannot be done as given ({type(error).__name__}: {error})"
         raise sheet.problem or InputError(problem, field=field, remedy="check the names and numbers given") from error
+
+
+@lru_cache(maxsize=4)
+def _model(text: str, folder: Path, _: tuple[str, ...]) -> Model:
+    """Return the model of a text and of files named in it as they were written last: an action reads two texts."""
+    data = with_rows(data_of(text), folder)
+    empty = not data.get("body")
+    return model_from(
+        {key: each for key, each in data.items() if key != "assembly"} | _NO_BODY if empty else data, "", text
+    )
+
+
+def _written_at(data: Any, folder: Path) -> tuple[str, ...]:
+    """Return when the files were written that texts in data may name."""
+    found = []
+    for _, value in leaves(data):
+        if isinstance(value, str) and "." in value and len(value) < _NAME_LETTERS:
+            with suppress(OSError, ValueError):
+                state = (folder / value).stat()
+                found.append(f"{value} {state.st_mtime_ns} {state.st_size}")
+    return tuple(found)
 
 
 def check_name(name: Any, names: Iterable[str], field: str) -> None:
