@@ -1,8 +1,7 @@
 """Sheet: the text of a model file that may still be incomplete, with its numbers and the poses that it describes."""
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
 from functools import cached_property, lru_cache
 from math import atan2, hypot, pi
