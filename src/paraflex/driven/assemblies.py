@@ -4,9 +4,11 @@ from typing import NamedTuple
 
 import numpy as np
 
+from paraflex.arrays import Array
 from paraflex.dynamics import reference_pose
 from paraflex.kernel.closure import LOOPS_CLOSED
 from paraflex.mechanism import Assembly
+from paraflex.paths.loops import LoopClosure
 from .exact import ExactMotion
 
 # Random starts, and the distance within which two poses are one [sizes of the mechanism, rad].
@@ -39,9 +41,17 @@ def assemblies_of(motion: ExactMotion, starts: int = _STARTS) -> list[FoundAssem
         Assemblies, that of the motion first.
     """
     loops = motion.loops
+    return [
+        FoundAssembly({body.name: float(q[body.angle]) for body in loops.system.bodies}, count)
+        for q, count in poses_of(loops, motion.solution.q[0], starts)
+    ]
+
+
+def poses_of(loops: LoopClosure, first: Array, starts: int = _STARTS) -> list[tuple[Array, int]]:
+    """Return the poses (n,) in which loops close, and the number of random starts that led to each: see above."""
     system, random = loops.system, np.random.default_rng(0)
     angles = [body.angle for body in system.bodies]
-    poses, counts = [motion.solution.q[0]], [0]
+    poses, counts = [first], [0]
     for _ in range(starts):
         turned = Assembly("", {body.name: random.uniform(-np.pi, np.pi) for body in system.bodies})
         status, _, (found, *_) = loops.run(np.zeros(1), np.zeros((1, 3, 0)), reference_pose(system, turned))
@@ -58,7 +68,4 @@ def assemblies_of(motion: ExactMotion, starts: int = _STARTS) -> list[FoundAssem
             q[angles] = (q[angles] + np.pi) % (2.0 * np.pi) - np.pi
             poses.append(q)
             counts.append(1)
-    return [
-        FoundAssembly({body.name: float(q[body.angle]) for body in system.bodies}, count)
-        for q, count in zip(poses, counts, strict=True)
-    ]
+    return list(zip(poses, counts, strict=True))

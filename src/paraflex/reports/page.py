@@ -166,7 +166,7 @@ def render(page: Page) -> str:
         no_survey="" if page.survey else "hidden",
         version=escape(version("paraflex")),
         style="\n".join(map(_asset, _STYLES)),
-        data=_script_json(_data(page)),
+        data=_script_json(page_data(page)),
         scripts="\n".join(map(_asset, _SCRIPTS)),
         plotly=plotly_script(whole=_needs_whole(page)),
     )
@@ -209,7 +209,7 @@ def _needs_whole(page: Page) -> bool:
     return any(getattr(chart, "drawer", "") == PARALLEL for panel in page.survey for chart in panel.charts)
 
 
-def _data(page: Page) -> dict[str, Any]:
+def page_data(page: Page) -> dict[str, Any]:
     """Return the data for the scripts."""
     series = Series()
     time = series.add(page.time, exact=True)

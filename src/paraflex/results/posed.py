@@ -147,15 +147,15 @@ def _assembled(mechanism: Mechanism, assembly: str | None, path: tuple[str, Path
         gaps = {
             name: f"{number(gap, 3)} {units[name]}" for name, gap in joint_gaps(rigid, phi).items() if gap > _CLOSED
         }
-        return replace(_of(mechanism, rigid, chosen.name, q[None], path, (found.problem,)), gaps=gaps)
+        return replace(posed_at(mechanism, rigid, chosen.name, q[None], path, (found.problem,)), gaps=gaps)
     if path is None:
-        return _of(mechanism, rigid, chosen.name, found.state.q[None])
+        return posed_at(mechanism, rigid, chosen.name, found.state.q[None])
     try:
         times = np.linspace(0.0, path[1].duration, _POSES)
         motion = follow_path(mechanism, path[1], times, assembly=chosen)
     except (InputError, NumericalError) as error:
-        return _of(mechanism, rigid, chosen.name, found.state.q[None], path, (f"path {path[0]}: {error}",))
-    shown = _of(mechanism, rigid, chosen.name, motion.q, path)
+        return posed_at(mechanism, rigid, chosen.name, found.state.q[None], path, (f"path {path[0]}: {error}",))
+    shown = posed_at(mechanism, rigid, chosen.name, motion.q, path)
     return replace(shown, moves=first_movements_along(rigid, motion.q))
 
 
@@ -170,10 +170,10 @@ def _started(mechanism: Mechanism, assembly: str | None, start: Start) -> Posed:
             raise
         instead = _assembled(mechanism, assembly)
         return replace(instead, problems=(*instead.problems, f"start: {error}"))
-    return _of(mechanism, system, "" if chosen is None else chosen.name, state.q[None])
+    return posed_at(mechanism, system, "" if chosen is None else chosen.name, state.q[None])
 
 
-def _of(
+def posed_at(
     mechanism: Mechanism,
     system: System,
     assembly: str,
@@ -181,6 +181,7 @@ def _of(
     path: tuple[str, Path] | None = None,
     problems: tuple[str, ...] = (),
 ) -> Posed:
+    """Return the pose of a mechanism at coordinates q (k, n) of a system of it, of which the first are drawn."""
     data = drawing_data(mechanism, system_drawing(system, q), np.arange(len(q), dtype=float))
     angles = {body.name: float(q[0][system.body(body.name).angle]) for body in mechanism.bodies}
     loads = None

@@ -1,26 +1,46 @@
-"""The model of the text as far as it can be read, its pose, and the picture of both."""
+"""The model of the text as far as it can be read, the pose that a person has moved it to, and the picture of both."""
 
+from pathlib import Path
 from typing import Any
 
-from paraflex.errors import ParaflexError
+import numpy as np
+
+from paraflex.errors import InputError, NumericalError, ParaflexError
 from paraflex.files import Model
 from paraflex.files.library import library_text
 from paraflex.files.model import model_of_text
 from paraflex.plots.scene import Limits
 from paraflex.plots.svg import sketch
-from paraflex.results.posed import Posed, posed
+from paraflex.results.posed import Posed, posed, posed_at
 from .document import Document
+from .messages import Message, described
+from .moving import Mover, assemblies
 from .picture import picture
+from .seeing import Seeing, readiness
 
 
 class Bench:
-    """What a document describes: its last readable model, and the pose that is shown."""
+    """Model of a document, its pose, and the numbers of the pose.
+
+    Attributes
+    ----------
+    model : Model or None
+        Model of the newest text that could be read; None if there was none.
+    problem : ParaflexError or None
+        Reason why the text cannot be read, or its pose not be found.
+    mode : str
+        Name of the chosen actuation mode; empty for none.
+    """
 
     def __init__(self, document: Document) -> None:
         self._document = document
         self.model: Model | None = None
-        self.shown: Posed | None = None
         self.problem: ParaflexError | None = None
+        self.mode: str = ""
+        self._open: Posed | None = None
+        self._mover: Mover | None = None
+        self._seeing: Seeing | None = None
+        self._found: list[Any] = []
         self._view: Limits | None = None
         self.renew()
 
@@ -29,34 +49,121 @@ class Bench:
         return model_of_text(self._document.text, self._document.name, self._document.folder)
 
     def renew(self) -> None:
-        """Read the text again; the last pose stays if it cannot be read."""
+        """Read the text again; the picture stays if it cannot be read, and the pose is near the one before."""
         self.problem = None
         try:
-            self.model = self.read()
-            self.shown = posed(self.model.mechanism, self.model.study.assembly)
+            model = self.read()
         except ParaflexError as error:
             self.problem = error
+            # A sheet without bodies is not one that cannot be read.
+            if error.field == "body":
+                self.model, self._mover, self._seeing, self._open = None, None, None, None
+            return
+        self.model = model
+        if self.mode not in [mode.name for mode in model.mechanism.modes]:
+            self.mode = next(iter(model.study.modes), next((one.name for one in model.mechanism.modes), ""))
+        self._pose(model)
+
+    def _pose(self, model: Model) -> None:
+        """Move to the pose nearest to the present one in the changed mechanism; open loops are drawn as given."""
+        before, self._open = self._mover, None
+        try:
+            fresh = Mover(model.mechanism, model.study.assembly)
+            same = before is not None and before.mechanism.assemblies == model.mechanism.assemblies
+            if before is not None and same and before.is_moved:
+                before.redraw(model.mechanism)
+                fresh = before
+            self._mover = fresh
+            self._seeing = Seeing(model, fresh) if self._seeing is None else self._seeing.renewed(model, fresh)
+        except (InputError, NumericalError) as error:
+            self._mover, self._seeing = None, None
+            try:
+                self._open = posed(model.mechanism, model.study.assembly)
+                if not self._open.problems:
+                    self.problem = error
+            except ParaflexError as other:
+                self.problem = other
 
     def show(self, limits: list[float]) -> None:
         """Take the part of the plane that a page shows: left, bottom, right, top [m]."""
         left, bottom, right, top = limits
-        self._view = Limits(left, right, bottom, top) if right > left and top > bottom else None
+        self._view = Limits(left, right, bottom, top) if 1e-9 < right - left < 1e9 and 1e-9 < top - bottom < 1e9 else None
+
+    @property
+    def mover(self) -> Mover:
+        """Pose that can be moved; InputError if there is none."""
+        if self._mover is None:
+            text = "the mechanism has no pose" if self.problem is None else str(self.problem)
+            raise InputError(text, field="assembly", remedy="draw links first, or correct the text")
+        return self._mover
 
     def picture(self) -> dict[str, Any] | None:
         """Return the picture of the pose; None if no pose is known."""
-        return None if self.shown is None else picture(self.shown, self._view)
+        if self._mover is not None and self.model is not None:
+            shown = posed_at(self.model.mechanism, self._mover.system, self._mover.assembly, self._mover.q[None])
+            return picture(shown, self._view)
+        return None if self._open is None else picture(self._open, self._view)
 
-    def state(self) -> dict[str, Any]:
+    def seen(self, *, quick: bool = False) -> dict[str, Any] | None:
+        """Return the numbers of the pose, those that are computed fast or all; None without a pose."""
+        if self._seeing is None or self._mover is None:
+            return None
+        q = self._mover.q
+        return self._seeing.quick(q, self.mode) if quick else self._seeing.full(q, self.mode)
+
+    def state(self) -> Message:
         """Return what a page shows of the model."""
-        from .session import described
+        mechanism = None if self.model is None else self.model.mechanism
+        return {
+            "picture": self.picture(),
+            "problem": None if self.problem is None else described(self.problem),
+            "assemblies": [] if mechanism is None else [one.name for one in mechanism.assemblies],
+            "assembly": "" if self._mover is None else self._mover.assembly,
+            "moved": self._mover is not None and self._mover.is_moved,
+            "mode": self.mode,
+            "seen": self.seen(),
+            "ready": readiness(self._document.text, self.model, self.problem),
+        }
 
-        problem = None if self.problem is None else described(self.problem)
-        return {"picture": self.picture(), "problem": problem}
+    def drag(self, body: str, local: list[float] | str, to: list[float]) -> Message:
+        """Drag a point of a body to a place [m]."""
+        moved = self.mover.drag(body, local, to)
+        return {**self._now(quick=True), "reached": moved.reached, "stop": moved.stop, "problem": moved.problem}
 
-    def library(self, names: list[str]) -> list[dict[str, Any]]:
-        """Return names, descriptions and sketches of library mechanisms."""
-        found = []
-        for name in names:
-            mechanism = model_of_text(library_text(name), name, self._document.folder).mechanism
-            found.append({"name": name, "title": mechanism.name, "about": mechanism.description, "svg": sketch(mechanism)})
-        return found
+    def drop(self) -> Message:
+        """End a drag."""
+        self.mover.release()
+        return self._now()
+
+    def back(self) -> Message:
+        """Return to the pose of the file."""
+        self.mover.to_assembly(self.mover.assembly)
+        return self._now()
+
+    def found_assemblies(self) -> Message:
+        """Search for all poses with the same place of the end-effector or drives."""
+        mover = self.mover
+        model = self.model
+        assert model is not None
+        self._found = assemblies(mover)
+        shown = [posed_at(model.mechanism, mover.system, "", q[None]) for q in self._found]
+        return {"assemblies": [{"name": "", "picture": picture(one)} for one in shown]}
+
+    def take_assembly(self, number: int) -> Message:
+        """Move to one of the poses that were found last."""
+        if not 0 <= number < len(self._found):
+            raise InputError("no such pose was found", field="number", value=number, remedy="search again")
+        self.mover.at(np.asarray(self._found[number]))
+        return self._now()
+
+    def _now(self, *, quick: bool = False) -> Message:
+        return {"picture": self.picture(), "seen": self.seen(quick=quick)}
+
+
+def library(names: list[str]) -> list[dict[str, Any]]:
+    """Return names, descriptions and sketches of library mechanisms."""
+    found = []
+    for name in names:
+        mechanism = model_of_text(library_text(name), name, Path()).mechanism
+        found.append({"name": name, "title": mechanism.name, "about": mechanism.description, "svg": sketch(mechanism)})
+    return found

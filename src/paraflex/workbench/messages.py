@@ -3,8 +3,9 @@
 import math
 from typing import Any, TypeVar
 
-from paraflex.errors import InputError
+from paraflex.errors import InputError, ParaflexError
 
+Message = dict[str, Any]
 T = TypeVar("T")
 _KINDS = {str: "a text", dict: "a table", list: "a list", bool: "true or false", int: "a whole number"}
 
@@ -43,3 +44,9 @@ def finite(value: Any) -> Any:
     if hasattr(value, "tolist"):
         return finite(value.tolist())
     return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
+def described(error: ParaflexError) -> Message:
+    """Return an error for the page: its line, the field at fault and the remedy."""
+    text = " ".join(str(error).split())
+    return {"text": text, "field": getattr(error, "field", ""), "remedy": getattr(error, "remedy", "")}

@@ -1,5 +1,6 @@
-"""Answers to the messages of a page: the text and its history, the pose, and what is computed of both."""
+"""Answers to the messages of a page: each request has a method that reads its fields and returns the reply."""
 
+import tempfile
 import threading
 import traceback
 from collections.abc import Callable
@@ -8,12 +9,17 @@ from typing import Any
 
 from paraflex.errors import InputError, ParaflexError, suggestion
 from paraflex.files.library import library_names, library_text
-from .bench import Bench
+from .actions import apply, what_goes
+from .bench import Bench, library
+from .bending import drag_force, linear
 from .document import EMPTY, Document
-from .messages import field, finite, numbers
+from .items import fields, outline
+from .leaving import figures, film, link, report, text_of_link
+from .messages import Message, described, field, finite, numbers, whole
 from .picture import looks
-
-Message = dict[str, Any]
+from .programs import program
+from .runs import Runner
+from .turning import turning
 
 
 class Session:
@@ -24,7 +30,7 @@ class Session:
     document : Document
         Text that is edited.
     send : callable
-        Function that sends an event to all pages.
+        Function that sends an event to all pages, from any thread.
     """
 
     def __init__(self, document: Document, send: Callable[[Message], None]) -> None:
@@ -32,7 +38,12 @@ class Session:
         self.bench = Bench(document)
         self._send, self._lock = send, threading.RLock()
         self._made: list[Path] = []
+        self._folder: tempfile.TemporaryDirectory[str] | None = None
         self._revision = 0
+        self._runner: Runner | None = None
+        self._requests = {
+            name.removeprefix("_do_"): getattr(self, name) for name in dir(type(self)) if name.startswith("_do_")
+        }
 
     def answer(self, message: Any) -> Message:
         """Return the reply to a message: "ok" with what was asked for, or "error" in one line; it never raises."""
@@ -41,10 +52,10 @@ class Session:
         try:
             with self._lock:
                 asked = field(message, "do", str)
-                known = {name.removeprefix("_do_"): name for name in dir(self) if name.startswith("_do_")}
-                if asked not in known:
-                    raise InputError("unknown request", field="do", value=asked, remedy=suggestion(asked, [*known]))
-                return {"id": number, "ok": finite(getattr(self, known[asked])(message))}
+                if asked not in self._requests:
+                    remedy = suggestion(asked, [*self._requests])
+                    raise InputError("unknown request", field="do", value=asked[:60], remedy=remedy)
+                return {"id": number, "ok": finite(self._requests[asked](message))}
         except ParaflexError as error:
             return {"id": number, "error": described(error)}
         except Exception as error:
@@ -63,18 +74,35 @@ class Session:
         """Return a file that was made for a page."""
         return self._made[number] if 0 <= number < len(self._made) else None
 
+    def warm_up(self) -> None:
+        """Start the process of runs before the first one."""
+        if self._runner is None:
+            self._runner = Runner()
+
     def close(self) -> None:
-        """End what runs in the background."""
+        """End what runs in the background, and delete what was made for pages."""
+        if self._runner is not None:
+            self._runner.close()
+        if self._folder is not None:
+            self._folder.cleanup()
+
+    # The text and its history.
 
     def _do_open(self, _: Message) -> Message:
         return {"looks": looks(), "recovered": self.document.recovered, **self._state()}
 
-    def _do_view(self, message: Message) -> Message:
-        self.bench.show(numbers(message, "limits", 4))
-        return {"picture": self.bench.picture()}
-
     def _do_text(self, message: Message) -> Message:
         return self._changed(field(message, "text", str))
+
+    def _do_act(self, message: Message) -> Message:
+        edited = apply(self.document.text, field(message, "action", dict), self.document.folder)
+        return {**self._changed(edited.text), "selected": edited.selected, "note": edited.note}
+
+    def _do_goes(self, message: Message) -> Message:
+        return {"goes": what_goes(self.document.text, field(message, "names", list))}
+
+    def _do_fields(self, message: Message) -> Message:
+        return fields(self.document.text, field(message, "place", list))
 
     def _do_undo(self, _: Message) -> Message:
         self.document.undo()
@@ -85,17 +113,103 @@ class Session:
         return self._renewed()
 
     def _do_save(self, message: Message) -> Message:
-        name = message.get("name")
-        self.document.save(None if name is None else field(message, "name", str))
+        self.document.save(None if message.get("name") is None else field(message, "name", str))
         return self._renewed()
 
     def _do_start(self, message: Message) -> Message:
-        """Begin with a library mechanism or an empty sheet: a step that can be undone."""
+        """Begin with a library mechanism, an empty sheet or the model of a link: a step that can be undone."""
+        if "link" in message:
+            return self._changed(text_of_link(field(message, "link", str)))
         name = field(message, "name", str)
         return self._changed(library_text(name) if name else EMPTY)
 
     def _do_library(self, _: Message) -> Message:
-        return {"mechanisms": self.bench.library(library_names())}
+        return {"mechanisms": library(library_names())}
+
+    # The pose.
+
+    def _do_view(self, message: Message) -> Message:
+        self.bench.show(numbers(message, "limits", 4))
+        return {"picture": self.bench.picture()}
+
+    def _do_drag(self, message: Message) -> Message:
+        to = numbers(message, "to", 2)
+        if "point" in message:
+            body, _, point = field(message, "point", str).partition(".")
+            return self.bench.drag(body, point, to)
+        return self.bench.drag(field(message, "body", str), numbers(message, "local", 2), to)
+
+    def _do_drop(self, _: Message) -> Message:
+        return self.bench.drop()
+
+    def _do_back(self, _: Message) -> Message:
+        return self.bench.back()
+
+    def _do_pose(self, _: Message) -> Message:
+        mover = self.bench.mover
+        action = {"kind": "pose", "assembly": mover.assembly, "angles": mover.angles(), "places": mover.places()}
+        edited = apply(self.document.text, action, self.document.folder)
+        mover.release()
+        return self._changed(edited.text)
+
+    def _do_assemblies(self, _: Message) -> Message:
+        return self.bench.found_assemblies()
+
+    def _do_assembly(self, message: Message) -> Message:
+        return self.bench.take_assembly(field(message, "number", int))
+
+    def _do_mode(self, message: Message) -> Message:
+        return self.bench.choose_mode(field(message, "name", str))
+
+    def _do_turn(self, message: Message) -> Message:
+        given = {name: message[name] for name in ("drive", "speed") if message.get(name) is not None}
+        return turning(self.bench.known_model, assembly=self.bench.mover.assembly, **given)
+
+    # What is computed of the flexible mechanism.
+
+    def _do_run(self, message: Message) -> Message:
+        self.warm_up()
+        assert self._runner is not None
+        request = {"text": self.document.text, "folder": self.document.folder, "source": self.document.name}
+        request |= {name: field(message, name, list) for name in ("modes",) if message.get(name)}
+        return {"run": self._runner.start(request, lambda event: self._send({"event": "run", **event}))}
+
+    def _do_cancel(self, _: Message) -> Message:
+        if self._runner is not None:
+            self._runner.cancel()
+        return {}
+
+    def _do_force(self, message: Message) -> Message:
+        return drag_force(self.bench.known_model, self.bench.mover.q, field(message, "ref", str), numbers(message, "force", 2))
+
+    def _do_linear(self, _: Message) -> Message:
+        return linear(self.bench.known_model, self.bench.mode)
+
+    # What a person takes away.
+
+    def _do_leave(self, message: Message) -> Message:
+        what, text, folder = field(message, "what", str), self.document.text, self.document.folder
+        source = Path(self.document.name).stem
+        if what == "link":
+            return {"text": link(text)}
+        if what == "program":
+            return {"text": program(text)}
+        out = whole(what, ("report", "svg", "pdf", "png", "film"))
+        place = self._out() / str(len(self._made))
+        if out == "report":
+            return self._address(report(text, folder, place, source=source))
+        if out == "film":
+            return self._address(film(text, folder, place / f"{source}.gif", source=source))
+        return self._address(figures(text, folder, place / f"{source}.{out}", source=source))
+
+    def _out(self) -> Path:
+        if self._folder is None:
+            self._folder = tempfile.TemporaryDirectory(prefix="paraflex-")
+        return Path(self._folder.name)
+
+    def _address(self, made: Path) -> Message:
+        self._made.append(made)
+        return {"address": f"made/{len(self._made) - 1}/{made.name}", "file": str(made)}
 
     def _changed(self, text: str) -> Message:
         self.document.change(text)
@@ -110,12 +224,13 @@ class Session:
 
     def _state(self) -> Message:
         document = self.document
+        try:
+            things = outline(document.text)
+        except ParaflexError:
+            things = []
         return {
-            "revision": self._revision, "text": document.text, "name": document.name, "file": None if document.file is None else str(document.file),
-            "saved": document.saved, "undo": document.can_undo, "redo": document.can_redo, **self.bench.state(),
+            "revision": self._revision, "text": document.text, "name": document.name,
+            "file": None if document.file is None else str(document.file), "saved": document.saved,
+            "undo": document.can_undo, "redo": document.can_redo, "outline": things, "selected": "", "note": "",
+            **self.bench.state(),
         }  # fmt: skip
-
-
-def described(error: ParaflexError) -> Message:
-    """Return an error for the page: its line, the field at fault and the remedy."""
-    return {"text": str(error), "field": getattr(error, "field", ""), "remedy": getattr(error, "remedy", "")}

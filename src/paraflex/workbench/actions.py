@@ -1,0 +1,106 @@
+"""Actions of a person on the workbench, each an edit of the text of the model file."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from paraflex.errors import InputError, NumericalError
+from paraflex.mechanism.quantities import known
+from .adding import ADDING
+from .changing import CHANGING
+from .dependents import falling, spelt, thing_of
+from .moving_points import move_point
+from .sheet import Sheet
+
+_ACTIONS = {**ADDING, **CHANGING, "move-point": move_point}
+
+
+@dataclass(frozen=True)
+class Edited:
+    """Result of an action.
+
+    Attributes
+    ----------
+    text : str
+        Text of the file after the action.
+    selected : str
+        Member that the action is about, "body.link1"; empty if it is gone.
+    note : str
+        Remark for the person, such as what was deleted as well; empty by default.
+    """
+
+    text: str
+    selected: str = ""
+    note: str = ""
+
+
+def apply(text: str, action: Mapping[str, Any], folder: Path | None = None) -> Edited:
+    """Apply an action to the text of a model file, and change nothing else in it.
+
+    Parameters
+    ----------
+    text : str
+        Text of the file; it may have no bodies yet.
+    action : mapping
+        `kind` of the action, and what it needs; an `assembly` names the one in which coordinates count.
+    folder : Path, optional
+        Folder of the file, in which files named in it are found.
+
+    Raises
+    ------
+    InputError
+        Text that is not TOML, unknown or incomplete action, or action after which the model could not be read.
+    """
+    if not isinstance(action, Mapping):
+        raise InputError("not an action", field="action", value=action, remedy='give {"kind": "add-ground", ...}')
+    known(action.get("kind", ""), list(_ACTIONS), "kind", "action")
+    before = Sheet(text, folder or Path())
+    try:
+        _ = before.data, before.problem
+        known(action.get("assembly") or before.shown, ["", *before.names("assembly")], "assembly", "assembly") if (
+            action["kind"] != "pose"
+        ) else None
+        after, selected = _ACTIONS[action["kind"]](before, action)
+        _check(before, after, action)
+    except InputError:
+        raise
+    except NumericalError as error:
+        raise InputError(error.problem, field=action["kind"], remedy=error.remedy) from None
+    except (TypeError, ValueError, KeyError, AttributeError, IndexError, OverflowError) as error:
+        problem = f"cannot be done as given ({type(error).__name__}: {error})"
+        raise InputError(problem, field=action["kind"], remedy="check what the action names") from error
+    return Edited(after.text, selected, _note(before, action))
+
+
+def what_goes(text: str, names: Sequence[Any]) -> list[dict[str, Any]]:
+    """Return what is deleted together with members, without these: `kind`, `name` and `place` of each.
+
+    Raises
+    ------
+    InputError
+        Unknown name, or member that something else needs.
+    """
+    data = Sheet(text).data
+    things = [thing_of(data, name) for name in names]
+    found = falling(data, things)
+    return [{"kind": str(place[0]), "name": spelt(place), "place": list(place)} for place in found[len(things) :]]
+
+
+def _check(before: Sheet, after: Sheet, action: Mapping[str, Any]) -> None:
+    """Check that the text can still be read as a model if it could before, or is not worse at the field set."""
+    _ = after.data
+    if after.problem is None or after.text == before.text:
+        return
+    if before.problem is None:
+        raise after.problem
+    place = ".".join(map(str, action.get("place", ())))
+    if place and after.problem.field.startswith(place) and str(after.problem) != str(before.problem):
+        raise after.problem
+
+
+def _note(before: Sheet, action: Mapping[str, Any]) -> str:
+    if action["kind"] != "delete":
+        return ""
+    gone = [one["name"] for one in what_goes(before.text, action.get("names", ()))]
+    return f"also deleted: {', '.join(gone)}" if gone else ""

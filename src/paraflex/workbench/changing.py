@@ -1,0 +1,243 @@
+"""Actions that change, rename, copy and delete what is there."""
+
+from collections.abc import Callable, Mapping, Sequence
+from math import pi
+from typing import Any
+
+from paraflex.errors import InputError
+from paraflex.files.fields import Place, field_at, value_at
+from paraflex.files.overlay import value_of
+from paraflex.files.schema import ModelTable
+from paraflex.mechanism.joints import GROUND
+from paraflex.mechanism.poses import Pose
+from .dependents import Use, falling, replaced, spelt, thing_of, uses
+from .edits import renamed, with_value, written
+from .sheet import XY, Action, Done, Sheet, check_name, near, placed
+
+# Members that are copied together with the joints and points that they name.
+_COPIED = ("joint", "spring", "damper", "friction", "linear_spring", "load", "sensor")
+
+
+def set_value(sheet: Sheet, action: Action) -> Done:
+    """Write a value as typed, or a value of JSON, at a place."""
+    place = _place(action)
+    inside: Any = sheet.data
+    for key in place[:-1]:
+        inside = value_at(inside, (key,)) if isinstance(inside, dict | list) else inside
+    if not (inside is None or isinstance(inside, dict) or (isinstance(inside, list) and place[-1] in range(len(inside)))
+            or (place[0] == "motor" and len(place) == 3)):  # fmt: skip
+        raise InputError("no such place in the file", field=".".join(map(str, place)), remedy="choose a field that is there")
+    if "value" in action:
+        text = written(action["value"], exact=True)
+    else:
+        text = _toml_of(sheet.data, place, str(action.get("text", "")).strip())
+    if len(place) > 2 and place[0] == "motor" and isinstance(value_at(sheet.data, place[:2]), str):
+        sheet = sheet.put(place[:2], {"joint": value_at(sheet.data, place[:2])})
+    after = sheet.with_text(with_value(sheet.text, place, text))
+    return placed(sheet, after), ".".join(map(str, place[:2]))
+
+
+def unset(sheet: Sheet, action: Action) -> Done:
+    """Remove an optional field."""
+    place = _place(action)
+    if value_at(sheet.data, place) is None:
+        raise InputError("is not in the file", field=".".join(map(str, place)), remedy="choose a field that is there")
+    return placed(sheet, sheet.without(place)), ".".join(map(str, place[:2]))
+
+
+def rename(sheet: Sheet, action: Action) -> Done:
+    """Give a member another name, in all references and expressions as well."""
+    of, name, to = action.get("of") or "", action.get("name"), action.get("to")
+    thing = thing_of(sheet.data, [of, name] if of and of != "point" else name)
+    above = value_at(sheet.data, thing[:-1])
+    if len(thing) < 2:
+        raise InputError("has no name of its own", field=spelt(thing), remedy="rename a member of a table")
+    if to == thing[-1]:
+        return sheet, spelt(thing)
+    check_name(to, above if isinstance(above, dict) else (), "to")
+    text, values = sheet.text, _values(sheet)
+    for use in [each for each in uses(sheet.data) if not each.is_key]:
+        found = replaced(use, thing, str(to))
+        if found is not None:
+            text = with_value(text, use.place, written(found))
+    for use in [each for each in uses(sheet.data) if each.is_key]:
+        found = replaced(use, thing, str(to))
+        if found is not None:
+            text = renamed(text, use.place, found)
+    after = sheet.with_text(renamed(text, thing, str(to)))
+    if _values(after) != values:
+        raise InputError("the name has another meaning in expressions", field="to", value=to, remedy="choose another")
+    return after, spelt((*thing[:-1], str(to)))
+
+
+def delete(sheet: Sheet, action: Action) -> Done:
+    """Delete members together with what depends on them."""
+    things = [thing_of(sheet.data, name) for name in action.get("names") or ()]
+    after, gone = sheet, falling(sheet.data, things)
+    whole = [place for place in gone if not any(place[: len(each)] == each for each in gone if each != place)]
+    # Items of a list go from its end, as their indices count from its start.
+    for place in sorted(whole, key=lambda each: [part for part in each if isinstance(part, int)], reverse=True):
+        after = after.without(place)
+    return placed(sheet, after), ""
+
+
+def pose(sheet: Sheet, action: Action) -> Done:
+    """Let the angles and places of a pose be those of an assembly, which is added if there is none of its name."""
+    name = action.get("assembly") or sheet.shown or "drawn"
+    given, before = value_at(sheet.data, ("assembly", name)), sheet
+    angles, points = action.get("angles") or {}, action.get("points") or {}
+    if given is None:
+        check_name(name, (), "assembly")
+        sheet = sheet.table(("assembly", name), {body: float(angle) for body, angle in angles.items()})
+        base = value_at(before.data, ("assembly", before.shown, "points")) or {}
+        points = {ref: points[ref] for ref in points if ref in base or not before.shown}
+    else:
+        for body, angle in angles.items():
+            if body in given:
+                sheet = _turned(sheet, ("assembly", name, body), float(angle))
+        points = {ref: place for ref, place in points.items() if ref in given.get("points", {})}
+    for ref, place in points.items():
+        sheet = sheet.put(("assembly", name, "points", ref), [float(each) for each in place])
+    return sheet, f"assembly.{name}"
+
+
+def copied(sheet: Sheet, action: Action) -> Done:
+    """Copy bodies and ground points, with the joints, springs, loads and sensors among them, to another place."""
+    dx, dy = map(float, action.get("by") or (0.0, 0.0))
+    return _doubled(sheet, action, lambda at: Pose(at.angle, (_xy(at)[0] + dx, _xy(at)[1] + dy)), mirrored=False)
+
+
+def mirrored(sheet: Sheet, action: Action) -> Done:
+    """Add the mirror image of bodies and ground points about a line parallel to the x or y axis."""
+    axis, about = action.get("axis", "y"), action.get("about") or 0.0
+    if axis not in ("x", "y"):
+        raise InputError("not an axis", field="axis", value=axis, remedy='give "x" or "y"')
+    line = float(about if isinstance(about, int | float) else about[axis == "x"])
+    if axis == "x":
+        return _doubled(sheet, action, lambda at: Pose(-at.angle, (_xy(at)[0], 2 * line - _xy(at)[1])), mirrored=True)
+    return _doubled(sheet, action, lambda at: Pose(pi - at.angle, (2 * line - _xy(at)[0], _xy(at)[1])), mirrored=True)
+
+
+def _doubled(sheet: Sheet, action: Action, image: Callable[[Pose], Pose], *, mirrored: bool) -> Done:
+    """Add the image of members under new names."""
+    before, named = sheet, [thing_of(sheet.data, name) for name in action.get("names") or ()]
+    bodies = [str(thing[1]) for thing in named if thing[0] == "body"]
+    if not named or not bodies and not any(thing[0] == GROUND for thing in named):
+        raise InputError("nothing to copy", field="names", value=action.get("names"), remedy="choose bodies or points")
+    refs = {use.text for use in uses(sheet.data) if use.kind == "ref" and use.place[0] == "joint"
+            and any(each.place[:2] == use.place[:2] and each.text.partition(".")[0] in bodies for each in uses(sheet.data)
+                    if each.kind == "ref")}  # fmt: skip
+    grounds = [ref.partition(".")[2] for ref in refs if ref.startswith(f"{GROUND}.")]
+    grounds = list(dict.fromkeys([str(thing[1]) for thing in named if thing[0] == GROUND] + sorted(grounds)))
+    names: dict[Place, str] = {}
+    for name in grounds:
+        x, y = _xy(image(Pose(0.0, sheet.place(f"{GROUND}.{name}", sheet.shown))))
+        names[GROUND, name] = sheet.fresh_point()
+        sheet = sheet.put((GROUND, names[GROUND, name]), [x, y])
+    frames: dict[str, dict[str, Pose]] = {assembly: {} for assembly in sheet.names("assembly")}
+    for body in bodies:
+        names["body", body] = new = sheet.fresh(body.rstrip("0123456789") or body, "body")
+        table = sheet.data["body"][body]
+        sheet = sheet.table(("body", new), _flipped(table, body) if mirrored else table, exact=True)
+        for assembly in frames:
+            at = before.frames.get(assembly, {}).get(body)
+            if at is not None and at.position is not None:
+                frames[assembly][new] = image(at)
+                sheet = sheet.put(("assembly", assembly, new), near(image(at).angle, 0.0))
+    for table in _COPIED:
+        for name, member in before.data.get(table, {}).items():
+            sheet = _with_copy(sheet, before, (table, name), member, names, mirrored=mirrored)
+    selected = [spelt((thing[0], name)) for thing, name in names.items()]
+    return placed(before, sheet, frames), selected[-1]
+
+
+def _with_copy(
+    sheet: Sheet, before: Sheet, thing: Place, member: Any, names: dict[Place, str], *, mirrored: bool
+) -> Sheet:
+    """Add a copy of a member if all that it names is copied."""
+    own = [use for use in uses(before.data) if use.place[:2] == thing and use.kind in ("ref", "joint", "body", "own")]
+    renamed_to = {use.place: next((new for each, to in names.items() if (new := replaced(use, each, to)) and new != use.text),
+                                  None) for use in own}  # fmt: skip
+    if not own or any(new is None and use.kind != "own" for use, new in zip(own, renamed_to.values(), strict=True)):
+        return sheet
+    table, name = str(thing[0]), str(thing[1])
+    new = sheet.fresh_point() if table == "joint" and len(name) <= 2 else sheet.fresh(name.rstrip("0123456789"), table)
+    names[thing] = new
+    copy = _with_names(member, thing, {place: text for place, text in renamed_to.items() if text})
+    if mirrored and table == "joint" and isinstance(copy, dict):
+        copy = {key: _minus(each) if key in ("angle", "direction") else each for key, each in copy.items()}
+    return sheet.table((table, new), copy, exact=True) if isinstance(copy, dict) else sheet.put((table, new), copy)
+
+
+def _with_names(value: Any, place: Place, texts: Mapping[Place, str]) -> Any:
+    if isinstance(value, dict):
+        return {key: _with_names(each, (*place, key), texts) for key, each in value.items()}
+    if isinstance(value, list):
+        return [_with_names(each, (*place, k), texts) for k, each in enumerate(value)]
+    return texts.get(place, value)
+
+
+def _flipped(table: Mapping[str, Any], body: str) -> dict[str, Any]:
+    """Return the table of a body mirrored about the x axis of its frame."""
+    kind = table.get("type", "rigid")
+    if kind == "modal":
+        raise InputError("a body of matrices has no mirror image", field=f"body.{body}", remedy="copy it instead")
+    if kind != "rigid":
+        return dict(table)
+    points = {name: [x, _minus(y)] for name, (x, y) in table.get("points", {}).items()}
+    centre = table.get("centre_of_mass")
+    return {**table, "points": points} | ({"centre_of_mass": [centre[0], _minus(centre[1])]} if centre else {})
+
+
+def _minus(value: Any) -> Any:
+    return f"-({value})" if isinstance(value, str) else -value if value else value
+
+
+def _xy(pose: Pose) -> XY:
+    assert pose.position is not None
+    return pose.position
+
+
+def _turned(sheet: Sheet, place: Place, angle: float) -> Sheet:
+    """Write an angle of an assembly, unless it is an expression, which approximates it well enough."""
+    old = value_at(sheet.data, place)
+    return sheet if isinstance(old, str) else sheet.put(place, near(angle, float(old)))
+
+
+def _place(action: Action) -> Place:
+    place = action.get("place")
+    if isinstance(place, Sequence) and not isinstance(place, str) and place and isinstance(place[0], str):
+        return tuple(place)
+    raise InputError("not a place in the file", field="place", value=place, remedy='give ["body", "link1", "length"]')
+
+
+def _toml_of(data: Mapping[str, Any], place: Place, text: str) -> str:
+    """Return a typed text as TOML: a value as it is, names and expressions in quotes."""
+    annotation = field_at(ModelTable, data, place).annotation
+    plain = annotation is str or (isinstance(annotation, type) and issubclass(annotation, str))
+    value = text if plain and not text.startswith(('"', "'")) else value_of(text)
+    if isinstance(value, str) and value == text:
+        return written(text)
+    # A comment behind the value would hide what follows in an inline table.
+    return written(value) if "#" in text or "\n" in text else text
+
+
+def _values(sheet: Sheet) -> list[float]:
+    """Return the values of all expressions, in the order of the file."""
+    found: list[float] = []
+    for use in uses(sheet.data):
+        if use.kind == "expression" and not use.is_key:
+            found += _value(sheet, use)
+    return found
+
+
+def _value(sheet: Sheet, use: Use) -> list[float]:
+    try:
+        return [sheet.number(use.place)]
+    except InputError:
+        return []
+
+
+CHANGING: dict[str, Callable[[Sheet, Action], Done]] = {
+    "set": set_value, "unset": unset, "rename": rename, "copy": copied, "mirror": mirrored, "delete": delete, "pose": pose,
+}  # fmt: skip

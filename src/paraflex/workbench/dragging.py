@@ -1,0 +1,193 @@
+"""Descent of a rigid pose towards a target of one of its points, along the closed loops and inside its assembly."""
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+import scipy
+
+from paraflex.arrays import Array
+from paraflex.dynamics import System
+from paraflex.kernel.constraints import constraint_values
+from paraflex.kernel.packed import Signals, make_scratch
+from .branches import Guard
+
+# Longest and shortest step, and step of the finite differences for second derivatives [sizes of the mechanism, rad].
+_LONGEST, _SHORTEST, _DIFFERENCE = 0.2, 1e-11, 1e-6
+# A target nearer than this is reached [sizes of the mechanism].
+REACHED = 1e-9
+# Largest residual of closed loops [sizes of the mechanism, rad], iterations with one factor, and factors.
+_CLOSED, _CHORDS, _FACTORS = 1e-13, 6, 4
+# Slopes and curvatures below these are zero; weight of violated guards beside the distance.
+_LEVEL, _FLAT, _WEIGHT = 1e-10, 1e-7, 10.0
+
+
+class Slope(NamedTuple):
+    """Slope and curvature of half the squared distance from the target, in the free motions at a pose."""
+
+    free: Array
+    inverse: Array
+    gradient: Array
+    curvature: Array
+
+
+@dataclass(frozen=True)
+class Dragging:
+    """Material point of a body that is dragged, within guards.
+
+    Attributes
+    ----------
+    system : System
+        System of the rigid mechanism without prescribed motions.
+    signals : Signals
+        Its signals.
+    freedoms : int
+        Degrees of freedom.
+    at : int
+        Index of the body's first coordinate.
+    local : (2,) array
+        Place of the point in the body's frame [m].
+    guards : list of Guard
+        Quantities that keep their signs.
+    """
+
+    system: System
+    signals: Signals
+    freedoms: int
+    at: int
+    local: Array
+    guards: list[Guard]
+
+    def place(self, q: Array) -> Array:
+        """Return the position (2,) of the point [m]."""
+        c, s = np.cos(q[self.at + 2]), np.sin(q[self.at + 2])
+        x, y = self.local
+        return q[self.at : self.at + 2] + np.array([c * x - s * y, s * x + c * y])
+
+    def rows(self, q: Array) -> Array:
+        """Return the dimensionless derivative (2, n) of the position."""
+        rows = np.zeros((2, self.system.n))
+        arm = (self.place(q) - q[self.at : self.at + 2]) / self.system.size
+        rows[0, self.at] = rows[1, self.at + 1] = 1.0
+        rows[:, self.at + 2] = -arm[1], arm[0]
+        return rows
+
+    def distance(self, q: Array, target: Array) -> float:
+        """Return the distance of the point from a target [sizes of the mechanism]."""
+        return float(np.hypot(*(self.place(q) - target))) / self.system.size
+
+    def approach(self, q: Array, target: Array, iterations: int) -> Array:
+        """Return the pose nearest to a target that continuous motion from q leads to, or one on the way there."""
+        longest, merit = _LONGEST, self._merit(q, target)
+        for _ in range(iterations):
+            if self.distance(q, target) <= 0.1 * REACHED:
+                break
+            slope = self.slope(q, target)
+            step = self._step(q, slope, longest)
+            length = float(np.max(np.abs(step), initial=0.0))
+            while length > _SHORTEST:
+                trial = self.closed(q, step, slope.inverse)
+                if trial is not None and self._inside(trial) and self._merit(trial, target) < merit:
+                    break
+                step, length = 0.25 * step, 0.25 * length
+            else:
+                break
+            longest = min(_LONGEST, 4.0 * length)
+            q, merit = trial, self._merit(trial, target)
+            for guard in self.guards:
+                guard.pass_by(q)
+        return q
+
+    def slope(self, q: Array, target: Array) -> Slope:
+        """Return slope and curvature of half the squared distance, the latter of the Lagrangian by differences."""
+        jacobian, rank = self.system.dimensionless_jacobian(q), self.system.n - self.freedoms
+        left, sizes, right = np.linalg.svd(jacobian)
+        free, inverse = right[rank:].T, right[:rank].T @ (left[:, :rank] / sizes[:rank]).T
+        slope = self._slope(q, target)
+        multipliers = -inverse.T @ slope
+        here = slope + jacobian.T @ multipliers
+        columns = []
+        for column in free.T:
+            there = q + _DIFFERENCE * self.system.units * column
+            moved = self._slope(there, target) + self.system.dimensionless_jacobian(there).T @ multipliers
+            columns.append(free.T @ (moved - here) / _DIFFERENCE)
+        curvature = np.array(columns).reshape(self.freedoms, self.freedoms)
+        return Slope(free, inverse, free.T @ slope, 0.5 * (curvature + curvature.T))
+
+    def closed(self, q: Array, step: Array, inverse: Array) -> Array | None:
+        """Return the pose after a dimensionless step, loops closed by least changes; None if these exceed the step."""
+        units, at, length = self.system.units, q + self.system.units * step, float(np.max(np.abs(step)))
+        tolerance = _CLOSED * (1.0 + float(np.max(np.abs(q / units))))
+        moved = np.zeros_like(q)
+        for factor in range(_FACTORS):
+            for _ in range(_CHORDS):
+                phi = self._residual(at + units * moved)
+                if np.max(np.abs(phi), initial=0.0) <= tolerance:
+                    return at + units * moved
+                moved = moved - inverse @ phi
+                if not np.max(np.abs(moved)) <= length:
+                    return None
+            if factor < _FACTORS - 1:
+                rank = self.system.n - self.freedoms
+                left, sizes, right = np.linalg.svd(self.system.dimensionless_jacobian(at + units * moved))
+                inverse = right[:rank].T @ (left[:, :rank] / sizes[:rank]).T
+        return None
+
+    @cached_property
+    def _scratch(self) -> tuple[Array, Array, Array, Array]:
+        return make_scratch(self.system.packed), np.zeros(self.system.n), *np.zeros((2, self.system.m))
+
+    def _residual(self, q: Array) -> Array:
+        scratch, still, phi, rate = self._scratch
+        constraint_values(self.system.packed, self.signals, 0.0, q, still, scratch, phi, rate)
+        return phi / self.system.row_units
+
+    def _slope(self, q: Array, target: Array) -> Array:
+        return self.rows(q).T @ (self.place(q) - target) / self.system.size
+
+    def _merit(self, q: Array, target: Array) -> float:
+        """Return the distance, and more where guards have less room than their margins."""
+        distance = self.distance(q, target)
+        return distance + _WEIGHT * min(distance, 1.0) * sum(max(0.0, -guard.room(q)) for guard in self.guards)
+
+    def _inside(self, q: Array) -> bool:
+        return all(guard.room(q) > -0.7 * guard.margin for guard in self.guards)
+
+    def _step(self, q: Array, slope: Slope, longest: float) -> Array:
+        """Return a dimensionless step downhill, as far as the guards allow to first order."""
+        values, vectors = np.linalg.eigh(slope.curvature)
+        along = vectors.T @ slope.gradient
+        scale = np.maximum(np.abs(values), _FLAT)
+        # Along negative curvature the slope grows: the longest step is right, in either direction if it is zero yet.
+        scale = np.where(values < -_FLAT, np.minimum(scale, np.abs(along) / longest + 1e-300), scale)
+        move = vectors @ (-along / scale)
+        if np.max(np.abs(along), initial=0.0) <= _LEVEL and values.size and values[0] < -_FLAT:
+            move = longest * vectors[:, 0]
+        move *= min(1.0, longest / max(float(np.max(np.abs(slope.free @ move), initial=0.0)), 1e-300))
+        move = self._allowed(q, slope, move, vectors * np.sqrt(scale))
+        step = slope.free @ move
+        return step * min(1.0, longest / max(float(np.max(np.abs(step), initial=0.0)), 1e-300))
+
+    def _allowed(self, q: Array, slope: Slope, move: Array, root: Array) -> Array:
+        """Return the move nearest to one, in the metric root root^T, that leaves all guards room to first order."""
+        guards = [guard for guard in self.guards if guard.sign]
+        if not guards or not move.size:
+            return move
+        room = np.array([guard.room(q) for guard in guards])
+        nearby = [q + _DIFFERENCE * self.system.units * column for column in slope.free.T]
+        change = np.array([[guard.room(there) for there in nearby] for guard in guards]) - room[:, None]
+        change /= _DIFFERENCE
+        if np.all(room + change @ move >= 0.0):
+            return move
+        # Least distance programming (Lawson and Hanson): w = root^T (y - move), of least norm, with G w >= h.
+        G = np.linalg.solve(root, change.T).T
+        h = -room - change @ move
+        sizes = np.maximum(np.linalg.norm(G, axis=1), 1e-12)
+        G, h = G / sizes[:, None], h / sizes
+        E = np.vstack([G.T, h])
+        wish = np.append(np.zeros(len(move)), 1.0)
+        r = E @ scipy.optimize.nnls(E, wish)[0] - wish
+        if abs(r[-1]) < 1e-14:
+            return np.zeros_like(move)
+        return move + np.linalg.solve(root.T, -r[:-1] / r[-1])

@@ -1,0 +1,373 @@
+"""Pose of a mechanism that is dragged by hand: it follows the mouse as closed loops, and stays in its assembly."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+from typing import NamedTuple
+
+import numpy as np
+
+from paraflex.arrays import Array
+from paraflex.driven.assemblies import poses_of
+from paraflex.driven.exact import NO_TASKS
+from paraflex.driven.ranges import JointDrive
+from paraflex.dynamics import material_angle, reference_pose
+from paraflex.dynamics.joint_coordinates import joint_rows, joint_value
+from paraflex.dynamics.points import marker_position
+from paraflex.dynamics.projection import assemble, closed, constraint_change
+from paraflex.dynamics.soundness import mobility
+from paraflex.dynamics.state import State
+from paraflex.errors import InputError, NumericalError, listed
+from paraflex.mechanism import (
+    GROUND,
+    ConstantSpeed,
+    Joint,
+    Mechanism,
+    PointRef,
+    RevoluteJoint,
+    WeldJoint,
+)
+from paraflex.mechanism.masses import with_any_masses
+from paraflex.mechanism.poses import local_points
+from paraflex.mechanism.quantities import known
+from paraflex.paths.loops import LoopClosure
+from .branches import MARGIN, Branches, Guard
+from .dragging import REACHED, Dragging
+
+# Longest step of the target [sizes of the mechanism], their largest number, and iterations for a step and at the end.
+_STEP, _MOST_STEPS, _ON_THE_WAY, _AT_THE_END = 0.1, 24, 4, 60
+# Targets further away are brought nearer [sizes of the mechanism].
+_FAR = 20.0
+# Distance between poses that are remembered, and their number.
+_APART, _REMEMBERED = 0.02, 500
+# Elbows with a smaller sine are named where a drag stops; slopes of the distance below this belong to limits of reach.
+_NAMED, _LEVEL = 1e-2, 1e-2
+# Joints at which freedoms are held have independent coordinates, to this singular value.
+_INDEPENDENT = 1e-6
+_PARALLEL = "the drives {} cannot hold it: parallel singular position (type II)"
+
+
+class Moved(NamedTuple):
+    """Pose after a drag.
+
+    Attributes
+    ----------
+    q : (n,) array
+        Coordinates.
+    reached : bool
+        Whether the point is at the target.
+    stop : str
+        "reach" if the point is at a limit of reach, "singular" if it could move further, but only into another
+        assembly; empty if neither holds it back.
+    problem : str
+        Sentence on the limit or singular position; empty without one.
+    """
+
+    q: Array
+    reached: bool
+    stop: str = ""
+    problem: str = ""
+
+
+@dataclass
+class _Drag:
+    """One drag: its algebra, the target before, and poses that it has passed."""
+
+    dragging: Dragging
+    target: Array
+    determined: bool
+    passed: list[tuple[Array, Array]]
+
+
+class Mover:
+    """Rigid pose of a mechanism, which a person drags.
+
+    Prescribed motions are released; springs, dampers and friction have no effect; bodies need no masses.
+
+    Parameters
+    ----------
+    mechanism : Mechanism
+        Mechanism as described.
+    assembly : str, optional
+        Name of the assembly; the first by default.
+
+    Attributes
+    ----------
+    mechanism : Mechanism
+        Mechanism as described.
+    loops : LoopClosure
+        Closure of the rigid mechanism without prescribed motions.
+    q : (n,) array
+        Coordinates of the present pose, loops closed.
+    freedoms : int
+        Degrees of freedom.
+
+    Raises
+    ------
+    InputError
+        There is no assembly, or none of this name.
+    AssemblyError
+        The loops do not close.
+    """
+
+    q: Array
+
+    def __init__(self, mechanism: Mechanism, assembly: str | None = None) -> None:
+        self._take(mechanism)
+        self.to_assembly(assembly)
+
+    def _take(self, mechanism: Mechanism) -> None:
+        self.mechanism = mechanism
+        self._rigid = replace(with_any_masses(mechanism).rigid(), prescribed=())
+        self.loops = LoopClosure(self._rigid, 0.0, None, NO_TASKS)
+        self.system = self.loops.system
+
+    def to_assembly(self, name: str | None = None) -> Array:
+        """Move to an assembly of the mechanism, loops closed, and return the pose."""
+        if not self.mechanism.assemblies:
+            remedy = "add an [assembly.NAME] table with an approximate angle of each body, in rad"
+            raise InputError("no assembly: the poses of the bodies are unknown", field="assembly.NAME", remedy=remedy)
+        return self.at(self.loops.assembled(self.mechanism.assembly(name)))
+
+    def at(self, q: Array) -> Array:
+        """Move to a pose (n,), whose loops are closed, and return it; drags stay in its assembly."""
+        self.q = np.array(q, dtype=float)
+        found = mobility(self.system, State(0.0, self.q, np.zeros(self.system.n)))
+        self.freedoms = found.nearby_freedoms or found.freedoms
+        self._branches = Branches(self.system, self.freedoms, self.q)
+        self._signs: dict[tuple[str, str], Guard] = {}
+        self._drag: _Drag | None = None
+        return self.q
+
+    def redraw(self, mechanism: Mechanism) -> bool:
+        """Take a changed mechanism and close its loops from the present pose; return whether they do.
+
+        Otherwise the pose is that of the first assembly. Bodies that are new begin in the first assembly.
+
+        Raises
+        ------
+        InputError, AssemblyError
+            The loops close neither from the present pose nor in the assembly; the mover keeps its mechanism.
+        """
+        found = Mover(mechanism) if mechanism.assemblies else None
+        new = object.__new__(Mover) if found is None else found
+        if found is None:
+            new._take(mechanism)
+        guess = self._guess_for(new)
+        pose, phi = assemble(new.system, new.loops.signals, 0.0, guess, lambda q: constraint_change(new.system, q))
+        kept = closed(new.system, pose, phi)
+        if not kept and found is None:
+            new.to_assembly()
+        self._take(mechanism)
+        self.loops, self.system = new.loops, new.system
+        self.at(pose if kept else new.q)
+        return kept
+
+    def _guess_for(self, new: "Mover") -> Array:
+        """Return the present pose in the coordinates of another mechanism."""
+        guess = new.q.copy() if hasattr(new, "q") else np.zeros(new.system.n)
+        for body in new.system.bodies:
+            if body.name in self.system.index:
+                guess[body.all] = self.q[self.system.body(body.name).all]
+        return guess
+
+    def angles(self) -> dict[str, float]:
+        """Return the angles of all bodies at the present pose [rad]."""
+        return {body.name: float(self.q[body.angle]) for body in self.system.bodies}
+
+    def places(self) -> dict[str, tuple[float, float]]:
+        """Return the positions of all named points of bodies, by "body.point" [m]."""
+        refs = [PointRef(body.name, point) for body in self._rigid.bodies for point in body.points]
+        found = {str(ref): marker_position(self.system, self.system.marker(ref), self.q) for ref in refs}
+        return {name: (float(x), float(y)) for name, (x, y) in found.items()}
+
+    def release(self) -> None:
+        """End the present drag; the next one begins from the present pose."""
+        self._drag = None
+
+    def drag(self, body: str, local: Iterable[float] | str, to: Iterable[float]) -> Moved:
+        """Move a point of a body towards a target, as near as the loops and the assembly allow.
+
+        Parameters
+        ----------
+        body : str
+            Body.
+        local : (2,) array or str
+            Place of the point in the body's frame [m], or its name.
+        to : (2,) array
+            Target [m].
+        """
+        target = np.array([*to], dtype=float)
+        if target.shape != (2,) or not np.all(np.isfinite(target)):
+            raise InputError("not two finite numbers", field="to", value=target.tolist(), remedy="give x and y in m")
+        here = self._dragged(body, local)
+        drag, size = here.dragging, self.system.size
+        place = drag.place(self.q)
+        away = float(np.hypot(*(target - place))) / size
+        goal = place + (target - place) * min(1.0, _FAR / max(away, _FAR))
+        q = self._followed(here, self.q, here.target, goal)
+        if here.determined and drag.distance(q, goal) > REACHED:
+            q = self._from_passed(here, q, goal)
+        reached = drag.distance(q, target) <= REACHED
+        if reached and all(np.hypot(*(goal - at)) > _APART * size for at, _ in here.passed):
+            here.passed.append((goal, q))
+            del here.passed[1:-_REMEMBERED]
+        self.q, here.target = q, goal
+        return Moved(q, reached, *(("", "") if reached else self._stop(here, q, goal)))
+
+    def _followed(self, here: _Drag, q: Array, start: Array, goal: Array) -> Array:
+        """Return the pose that follows a target along a line, in short steps."""
+        steps = int(min(np.ceil(np.hypot(*(goal - start)) / (_STEP * self.system.size)), _MOST_STEPS))
+        for part in np.arange(1, steps) / max(steps, 1):
+            q = here.dragging.approach(q, start + part * (goal - start), _ON_THE_WAY)
+        return here.dragging.approach(q, goal, _AT_THE_END)
+
+    def _from_passed(self, here: _Drag, q: Array, goal: Array) -> Array:
+        """Return the pose that follows from the nearest pose passed in this drag, if it comes nearer to the target."""
+        place, pose = min(here.passed, key=lambda one: float(np.hypot(*(one[0] - goal))))
+        if np.hypot(*(place - goal)) >= self.system.size * here.dragging.distance(q, goal):
+            return q
+        again = self._followed(here, pose, place, goal)
+        return again if here.dragging.distance(again, goal) < here.dragging.distance(q, goal) - REACHED else q
+
+    def _dragged(self, body: str, local: Iterable[float] | str) -> _Drag:
+        """Return the drag of a point: the present one, or a new one."""
+        known(body, [one.name for one in self._rigid.bodies], "body", "body")
+        if isinstance(local, str):
+            places = local_points(self._rigid.body(body))
+            known(local, [*places], f"body.{body}", "point")
+            local = places[local]
+        at, point = self.system.body(body).offset, np.array([*local], dtype=float)
+        old = self._drag
+        if old is not None and old.dragging.at == at and np.array_equal(old.dragging.local, point):
+            return old
+        drag = Dragging(self.system, self.loops.signals, self.freedoms, at, point, [])
+        determined = self.freedoms == 2 and self._guide(body) is None
+        drag.guards.extend(self._guards(body, drag, determined=determined))
+        for guard in drag.guards:
+            guard.begin(self.q)
+        place = drag.place(self.q)
+        self._drag = _Drag(drag, place, determined, [(place, self.q)])
+        return self._drag
+
+    def _guide(self, body: str) -> Joint | None:
+        """Return the joint that guides a body on the ground."""
+        found = [one for one in self._rigid.joints_at[body] if one.moves and GROUND in (one.a.body, one.b.body)]
+        return found[0] if found else None
+
+    def _guards(self, body: str, drag: Dragging, *, determined: bool) -> list[Guard]:
+        """Return what keeps its sign as a point of a body is dragged; signs last as long as the assembly."""
+        own, guide = self._signs, self._guide(body)
+        guards = self._elbow_guards(chains=determined) if self.freedoms else []
+        if self.drives:
+            guards.append(self._drive_guard)
+        limit = f"limit of reach of {body}"
+        if self.freedoms == 1 and guide is not None:
+            rows = self._branches.joint_rows([guide.name])
+            guards.append(own.setdefault((body, guide.name), self._branches.determinant(rows, limit)))
+        elif determined:
+            guards.append(own.setdefault((body, str(drag.local)), self._branches.determinant(drag.rows, limit)))
+        return guards
+
+    def _elbow_guards(self, *, chains: bool) -> list[Guard]:
+        found = self._branches.guarded_elbows(chains=chains)
+        return [self._signs.setdefault(("", guard.text), guard) for guard in found]
+
+
+    @property
+    def drives(self) -> list[str]:
+        """Joints with prescribed motions or motors, if they are as many as the degrees of freedom; else none."""
+        given = self.mechanism.prescribed, self.mechanism.motors, (*self.mechanism.prescribed, *self.mechanism.motors)
+        for each in given:
+            joints = list(dict.fromkeys(one.joint for one in each))
+            if joints and len(joints) == self.freedoms:
+                return joints
+        return []
+
+    @property
+    def _drive_guard(self) -> Guard:
+        text = _PARALLEL.format(listed(self.drives))
+        return self._signs.setdefault(
+            ("", "drives"), self._branches.determinant(self._branches.joint_rows(self.drives), text)
+        )
+
+    def _stop(self, here: _Drag, q: Array, goal: Array) -> tuple[str, str]:
+        """Return what holds a point back from its target, and a sentence on it."""
+        drag = here.dragging
+        near = [guard for guard in drag.guards if guard.sign and guard.room(q) < guard.margin]
+        slope = drag.slope(q, goal)
+        falling = float(np.linalg.norm(slope.gradient)) > _LEVEL * drag.distance(q, goal)
+        lost = self._rank(drag, q, slope.free) < self._rank(drag, *self._usual)
+        if not near and not lost:
+            return "", ""
+        in_line = [one.text for one in self._branches.elbows if abs(np.sin(q[one.b] - q[one.a] + one.offset)) < _NAMED]
+        texts = dict.fromkeys([guard.text for guard in near] + in_line)
+        stop = "singular" if near and falling else "reach"
+        own = "singular position" if stop == "singular" else "limit of reach"
+        return stop, f"{own}: {listed([*texts])}" if texts else own
+
+    @property
+    def _usual(self) -> tuple[Array, Array]:
+        """Start pose of the assembly, and its free motions."""
+        return self._branches.start, self._branches.free(self._branches.start)
+
+    @staticmethod
+    def _rank(drag: Dragging, q: Array, free: Array) -> int:
+        """Return in how many directions the dragged point can move."""
+        return int(np.sum(np.linalg.svd(drag.rows(q) @ free, compute_uv=False) > 10.0 * MARGIN))
+
+
+def assemblies(mover: Mover, starts: int = 200, *, hold: str = "") -> list[Array]:
+    """Search for all assemblies at the present position of the drives or of the end-effector.
+
+    Parameters
+    ----------
+    mover : Mover
+        Mover at its present pose.
+    starts : int
+        Number of random starts, as in `driven.assemblies`.
+    hold : str
+        "drives", "end-effector", or empty for the drives if there are as many as degrees of freedom, else the
+        end-effector, else as many joints as needed, those at the ground first.
+
+    Returns
+    -------
+    list of (n,) array
+        Poses, the present one first.
+    """
+    known(hold, ["", "drives", "end-effector"], "hold", "choice")
+    loops = LoopClosure(_held(mover, hold), 0.0, None, NO_TASKS)
+    return [pose for pose, _ in poses_of(loops, mover.q, starts)]
+
+
+def _held(mover: Mover, hold: str) -> Mechanism:
+    """Return the rigid mechanism with its drives, end-effector or other joints held at the present pose."""
+    rigid, effector = mover.loops.mechanism, mover.mechanism.end_effector
+    if hold == "drives" or (not hold and mover.drives):
+        return _with_held(mover, mover.drives)
+    if effector is not None and not effector.point.on_ground and mover.freedoms in (2, 3):
+        place = marker_position(mover.system, mover.system.marker(effector.point), mover.q)
+        pin = PointRef(GROUND, "held._point")
+        ground = {**rigid.ground, pin.point: (float(place[0]), float(place[1]))}
+        angle = float(material_angle(mover.system, effector.point, mover.q[None])[0])
+        more = (
+            RevoluteJoint("held._joint", pin, effector.point)
+            if mover.freedoms == 2
+            else WeldJoint("held._joint", pin, effector.point, angle)
+        )
+        return replace(rigid, ground=ground, joints=(*rigid.joints, more))
+    grounded = [one.name for one in rigid.joints if one.moves and GROUND in (one.a.body, one.b.body)]
+    return _with_held(mover, list(dict.fromkeys([*grounded, *(one.name for one in rigid.joints if one.moves)])))
+
+
+def _with_held(mover: Mover, names: list[str]) -> Mechanism:
+    """Return the rigid mechanism with as many of some joints held as it has freedoms."""
+    free, held = Branches(mover.system, mover.freedoms, mover.q).free(mover.q), list[str]()
+    for name in names:
+        rows = joint_rows(mover.system, [*held, name], mover.q) * mover.system.units
+        rows[[mover.mechanism.slides(one) for one in (*held, name)]] /= mover.system.size
+        if np.linalg.svd(rows @ free, compute_uv=False)[-1] > _INDEPENDENT and len(held) < mover.freedoms:
+            held.append(name)
+    at = {name: joint_value(mover.system, name, mover.q) for name in held}
+    drives = tuple(JointDrive(f"{name} held", name, ConstantSpeed(value, 0.0)) for name, value in at.items())
+    left = replace(mover.loops.mechanism, motors=(), modes=())
+    return replace(left, prescribed=drives)
