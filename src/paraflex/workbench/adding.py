@@ -99,7 +99,9 @@ def add_slider(sheet: Sheet, action: Action) -> Done:
         rail, sheet = f"{GROUND}.{point}", sheet.put(("ground", point), tidy(place))
     if action.get("block", True) is False:
         if not pinned:
-            raise InputError("a slot holds the point of a link", field="at", value=at, remedy="choose a point of a link")
+            raise InputError(
+                "a slot holds the point of a link", field="at", value=at, remedy="choose a point of a link"
+            )
         return add_joint(sheet, {"type": "slot", "a": rail, "b": at, "direction": along, "assembly": shown})
     body = sheet.free_name(action, "body", "slider")
     pin = str(at).partition(".")[2] if pinned else rail.partition(".")[2]
@@ -190,7 +192,9 @@ def add_spring(sheet: Sheet, action: Action) -> Done:
 
 def add_damper(sheet: Sheet, action: Action) -> Done:
     """Add a damper at a joint."""
-    return _member(sheet, action, "damper", {"joint": action.get("joint"), "coefficient": action.get("coefficient", 0.1)})
+    return _member(
+        sheet, action, "damper", {"joint": action.get("joint"), "coefficient": action.get("coefficient", 0.1)}
+    )
 
 
 def add_load(sheet: Sheet, action: Action) -> Done:

@@ -9,6 +9,7 @@ from paraflex.errors import InputError, NumericalError, ParaflexError
 from paraflex.files import Model
 from paraflex.files.library import library_text
 from paraflex.files.model import model_of_text
+from paraflex.mechanism.quantities import known
 from paraflex.plots.scene import Limits
 from paraflex.plots.svg import sketch
 from paraflex.results.posed import Posed, posed, posed_at
@@ -41,6 +42,7 @@ class Bench:
         self._mover: Mover | None = None
         self._seeing: Seeing | None = None
         self._found: list[Any] = []
+        self._moved, self._assembly = False, ""
         self._view: Limits | None = None
         self.renew()
 
@@ -56,7 +58,7 @@ class Bench:
         except ParaflexError as error:
             self.problem = error
             # A sheet without bodies is not one that cannot be read.
-            if error.field == "body":
+            if getattr(error, "field", "") == "body":
                 self.model, self._mover, self._seeing, self._open = None, None, None, None
             return
         self.model = model
@@ -69,12 +71,15 @@ class Bench:
         before, self._open = self._mover, None
         try:
             fresh = Mover(model.mechanism, model.study.assembly)
+            self._assembly = model.mechanism.assembly(model.study.assembly).name
             same = before is not None and before.mechanism.assemblies == model.mechanism.assemblies
-            if before is not None and same and before.is_moved:
+            if before is not None and same and self._moved:
                 before.redraw(model.mechanism)
                 fresh = before
+            else:
+                self._moved = False
             self._mover = fresh
-            self._seeing = Seeing(model, fresh) if self._seeing is None else self._seeing.renewed(model, fresh)
+            self._seeing = Seeing(model, fresh)
         except (InputError, NumericalError) as error:
             self._mover, self._seeing = None, None
             try:
@@ -84,10 +89,17 @@ class Bench:
             except ParaflexError as other:
                 self.problem = other
 
+    @property
+    def assembly(self) -> str:
+        """Name of the assembly of the pose; empty without a pose."""
+        return self._assembly
+
     def show(self, limits: list[float]) -> None:
         """Take the part of the plane that a page shows: left, bottom, right, top [m]."""
         left, bottom, right, top = limits
-        self._view = Limits(left, right, bottom, top) if 1e-9 < right - left < 1e9 and 1e-9 < top - bottom < 1e9 else None
+        self._view = (
+            Limits(left, right, bottom, top) if 1e-9 < right - left < 1e9 and 1e-9 < top - bottom < 1e9 else None
+        )
 
     @property
     def mover(self) -> Mover:
@@ -100,7 +112,7 @@ class Bench:
     def picture(self) -> dict[str, Any] | None:
         """Return the picture of the pose; None if no pose is known."""
         if self._mover is not None and self.model is not None:
-            shown = posed_at(self.model.mechanism, self._mover.system, self._mover.assembly, self._mover.q[None])
+            shown = posed_at(self.model.mechanism, self._mover.system, self._assembly, self._mover.q[None])
             return picture(shown, self._view)
         return None if self._open is None else picture(self._open, self._view)
 
@@ -118,16 +130,30 @@ class Bench:
             "picture": self.picture(),
             "problem": None if self.problem is None else described(self.problem),
             "assemblies": [] if mechanism is None else [one.name for one in mechanism.assemblies],
-            "assembly": "" if self._mover is None else self._mover.assembly,
-            "moved": self._mover is not None and self._mover.is_moved,
+            "assembly": self._assembly,
+            "moved": self._moved,
             "mode": self.mode,
             "seen": self.seen(),
             "ready": readiness(self._document.text, self.model, self.problem),
         }
 
+    def choose_mode(self, name: str) -> Message:
+        """Choose the mode whose motors hold and drive."""
+        known(name, [one.name for one in self.known_model.mechanism.modes], "mode", "mode")
+        self.mode = name
+        return {"mode": self.mode, "seen": self.seen()}
+
+    @property
+    def known_model(self) -> Model:
+        """Model of the text; InputError if it cannot be read."""
+        if self.model is None or self.problem is not None:
+            self.model = self.read()
+        return self.model
+
     def drag(self, body: str, local: list[float] | str, to: list[float]) -> Message:
         """Drag a point of a body to a place [m]."""
         moved = self.mover.drag(body, local, to)
+        self._moved = True
         return {**self._now(quick=True), "reached": moved.reached, "stop": moved.stop, "problem": moved.problem}
 
     def drop(self) -> Message:
@@ -137,7 +163,8 @@ class Bench:
 
     def back(self) -> Message:
         """Return to the pose of the file."""
-        self.mover.to_assembly(self.mover.assembly)
+        self.mover.to_assembly(self._assembly)
+        self._moved = False
         return self._now()
 
     def found_assemblies(self) -> Message:
@@ -154,6 +181,7 @@ class Bench:
         if not 0 <= number < len(self._found):
             raise InputError("no such pose was found", field="number", value=number, remedy="search again")
         self.mover.at(np.asarray(self._found[number]))
+        self._moved = True
         return self._now()
 
     def _now(self, *, quick: bool = False) -> Message:

@@ -158,8 +158,14 @@ class Branches:
         (one, along), (other, beside) = arms
         a, b = (self.system.body(ref.body).angle for ref in (joint.a, joint.b))
         square = along != beside
-        text = f"{joint.b.body} square to the slide of {joint.a.body}" if beside < along else (
-            f"{joint.a.body} square to the slide of {joint.b.body}" if square else f"{joint.a.body} and {joint.b.body} in line"
+        text = (
+            f"{joint.b.body} square to the slide of {joint.a.body}"
+            if beside < along
+            else (
+                f"{joint.a.body} square to the slide of {joint.b.body}"
+                if square
+                else f"{joint.a.body} and {joint.b.body} in line"
+            )
         )
         return Elbow(joint.name, a, b, other - one, text)
 

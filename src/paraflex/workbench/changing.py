@@ -26,7 +26,9 @@ def set_value(sheet: Sheet, action: Action) -> Done:
         inside = value_at(inside, (key,)) if isinstance(inside, dict | list) else inside
     if not (inside is None or isinstance(inside, dict) or (isinstance(inside, list) and place[-1] in range(len(inside)))
             or (place[0] == "motor" and len(place) == 3)):  # fmt: skip
-        raise InputError("no such place in the file", field=".".join(map(str, place)), remedy="choose a field that is there")
+        raise InputError(
+            "no such place in the file", field=".".join(map(str, place)), remedy="choose a field that is there"
+        )
     if "value" in action:
         text = written(action["value"], exact=True)
     else:

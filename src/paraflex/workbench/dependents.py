@@ -58,7 +58,9 @@ def replaced(use: Use, thing: Place, name: str) -> str | None:
     if use.kind == "expression":
         return _in_expression(use.text, thing, name)
     if use.kind == "any":
-        return name if thing[0] in ("sensor", "motor", "joint") and use.text == old else _coordinate(use.text, thing, name)
+        return (
+            name if thing[0] in ("sensor", "motor", "joint") and use.text == old else _coordinate(use.text, thing, name)
+        )
     if use.kind == "coordinate":
         return name if thing[0] == "joint" and use.text == old else _coordinate(use.text, thing, name)
     if use.kind == "ref":
@@ -67,7 +69,9 @@ def replaced(use: Use, thing: Place, name: str) -> str | None:
         return name if thing == ("body", _owner(use), "points", use.text) else None
     if use.kind == "mode" and thing[0] == "motor":
         parts = use.text.split(",")
-        return ",".join(name if part.strip() == old else part for part in parts) if old in map(str.strip, parts) else None
+        return (
+            ",".join(name if part.strip() == old else part for part in parts) if old in map(str.strip, parts) else None
+        )
     return name if thing[:-1] == (use.kind,) and use.text == old else None
 
 

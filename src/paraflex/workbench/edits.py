@@ -88,7 +88,9 @@ def without(text: str, place: Sequence[str | int]) -> str:
         edited = _closed(edited[:start], edited[end:])
     edited = _checked(text, edited, place)
     above = place[:-1]
-    empty = above and value_at(parse_toml(edited), above) in (None, {}, []) and (len(above) != 2 or above[0] == "assembly")
+    empty = (
+        above and value_at(parse_toml(edited), above) in (None, {}, []) and (len(above) != 2 or above[0] == "assembly")
+    )
     return without(edited, above) if empty else edited
 
 
@@ -196,7 +198,9 @@ def _with_comment(text: str, header: Entry) -> int:
     if following is not None and following.place[0] == header.place[0]:
         return start
     above = re.compile(r"(?:\A|(?<=\n))(?:[ \t]*#[^\n]*\n)+\Z").search(text[:start])
-    return above.start() if above and (not above.start() or text[: above.start()].endswith(("\n\n", "\n\r\n"))) else start
+    return (
+        above.start() if above and (not above.start() or text[: above.start()].endswith(("\n\n", "\n\r\n"))) else start
+    )
 
 
 def _joined(cuts: Sequence[tuple[int, int]]) -> list[tuple[int, int]]:

@@ -1,6 +1,7 @@
 """Values of messages from a page, which may hold anything, and numbers that JSON can hold."""
 
 import math
+from collections.abc import Sequence
 from typing import Any, TypeVar
 
 from paraflex.errors import InputError, ParaflexError
@@ -23,7 +24,9 @@ def field(message: Any, name: str, kind: type[T]) -> T:
     found = message.get(name)
     if not isinstance(found, kind) or (isinstance(found, bool) and kind is not bool):
         value = str(found)[:60]
-        raise InputError(f"is not {_KINDS.get(kind, kind.__name__)}", field=name, value=value, remedy="load the page again")
+        raise InputError(
+            f"is not {_KINDS.get(kind, kind.__name__)}", field=name, value=value, remedy="load the page again"
+        )
     return found
 
 
@@ -31,8 +34,17 @@ def numbers(message: Any, name: str, count: int) -> list[float]:
     """Return a field of a message that is a list of finite numbers; see `field` for the errors."""
     found = field(message, name, list)
     if len(found) != count or not all(isinstance(one, int | float) and math.isfinite(one) for one in found):
-        raise InputError(f"is not {count} finite numbers", field=name, value=str(found)[:60], remedy="load the page again")
+        raise InputError(
+            f"is not {count} finite numbers", field=name, value=str(found)[:60], remedy="load the page again"
+        )
     return [float(one) for one in found]
+
+
+def one_of(value: str, choices: Sequence[str]) -> str:
+    """Return a word of a message that is one of the choices; InputError otherwise."""
+    if value not in choices:
+        raise InputError("unknown", field="what", value=value[:60], remedy=f"choose from {', '.join(choices)}")
+    return value
 
 
 def finite(value: Any) -> Any:

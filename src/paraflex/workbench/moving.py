@@ -272,7 +272,6 @@ class Mover:
         found = self._branches.guarded_elbows(chains=chains)
         return [self._signs.setdefault(("", guard.text), guard) for guard in found]
 
-
     @property
     def drives(self) -> list[str]:
         """Joints with prescribed motions or motors, if they are as many as the degrees of freedom; else none."""

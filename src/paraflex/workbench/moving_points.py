@@ -40,7 +40,9 @@ def move_point(sheet: Sheet, action: Action) -> Done:
         old = value_at(sheet.data, ("assembly", assembly, body))
         if turn and old is not None and not (isinstance(old, str) and names_in(old) & sheet.parameters.keys()):
             angle = before.angle(body, assembly) + turn
-            sheet = with_number(sheet, ("assembly", assembly, body), near(angle, before.number(("assembly", assembly, body))))
+            sheet = with_number(
+                sheet, ("assembly", assembly, body), near(angle, before.number(("assembly", assembly, body)))
+            )
     for each in moved:
         if value_at(sheet.data, ("assembly", assembly, "points", each)) is not None:
             sheet = sheet.put(("assembly", assembly, "points", each), list(to))
@@ -153,9 +155,7 @@ def _with_beam(sheet: Sheet, before: Sheet, named: tuple[str, str], frame: Pose,
     return sheet, near(angle - frame.angle, 0.0)
 
 
-def _with_bar(
-    sheet: Sheet, body: str, point: str, points: Any, frame: Pose, to: XY
-) -> tuple[Sheet, float]:
+def _with_bar(sheet: Sheet, body: str, point: str, points: Any, frame: Pose, to: XY) -> tuple[Sheet, float]:
     """Move one of the two points of a rigid body, which turns about the other one."""
     other = next(name for name in points if name != point)
     arm = (points[point][0] - points[other][0], points[point][1] - points[other][1])

@@ -5,7 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from paraflex.arrays import Array
+from paraflex.arrays import Array, Numbers
 from paraflex.mechanism import GROUND, Body, LumpedMass, Mechanism, PointRef
 from paraflex.mechanism.poses import Pose, local_points
 from paraflex.plots.marks import LOOKS, moving_marks, still_marks
@@ -103,8 +103,8 @@ def _pair(place: Array) -> list[float]:
     return [round(float(place[0]), _DIGITS), round(float(place[1]), _DIGITS)]
 
 
-def _line(places: Array) -> list[Any]:
+def _line(places: Numbers) -> list[Any]:
     """Return the points of a line; gaps are null."""
-    whole = np.isfinite(places).all(axis=1)
+    whole = np.isfinite(places).all(axis=-1)
     rounded = np.round(places, _DIGITS).tolist()
     return [point if known else None for point, known in zip(rounded, whole.tolist(), strict=True)]

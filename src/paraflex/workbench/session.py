@@ -15,7 +15,7 @@ from .bending import drag_force, linear
 from .document import EMPTY, Document
 from .items import fields, outline
 from .leaving import figures, film, link, report, text_of_link
-from .messages import Message, described, field, finite, numbers, whole
+from .messages import Message, described, field, finite, numbers, one_of
 from .picture import looks
 from .programs import program
 from .runs import Runner
@@ -146,8 +146,8 @@ class Session:
         return self.bench.back()
 
     def _do_pose(self, _: Message) -> Message:
-        mover = self.bench.mover
-        action = {"kind": "pose", "assembly": mover.assembly, "angles": mover.angles(), "places": mover.places()}
+        bench, mover = self.bench, self.bench.mover
+        action = {"kind": "pose", "assembly": bench.assembly, "angles": mover.angles(), "places": mover.places()}
         edited = apply(self.document.text, action, self.document.folder)
         mover.release()
         return self._changed(edited.text)
@@ -163,7 +163,7 @@ class Session:
 
     def _do_turn(self, message: Message) -> Message:
         given = {name: message[name] for name in ("drive", "speed") if message.get(name) is not None}
-        return turning(self.bench.known_model, assembly=self.bench.mover.assembly, **given)
+        return turning(self.bench.known_model, assembly=self.bench.assembly, **given)
 
     # What is computed of the flexible mechanism.
 
@@ -180,7 +180,9 @@ class Session:
         return {}
 
     def _do_force(self, message: Message) -> Message:
-        return drag_force(self.bench.known_model, self.bench.mover.q, field(message, "ref", str), numbers(message, "force", 2))
+        return drag_force(
+            self.bench.known_model, self.bench.mover.q, field(message, "ref", str), numbers(message, "force", 2)
+        )
 
     def _do_linear(self, _: Message) -> Message:
         return linear(self.bench.known_model, self.bench.mode)
@@ -194,13 +196,13 @@ class Session:
             return {"text": link(text)}
         if what == "program":
             return {"text": program(text)}
-        out = whole(what, ("report", "svg", "pdf", "png", "film"))
+        out = one_of(what, ("report", "svg", "pdf", "png", "film"))
         place = self._out() / str(len(self._made))
         if out == "report":
             return self._address(report(text, folder, place, source=source))
         if out == "film":
             return self._address(film(text, folder, place / f"{source}.gif", source=source))
-        return self._address(figures(text, folder, place / f"{source}.{out}", source=source))
+        return self._address(figures(text, folder, place / f"{source}.{out}", source=source)[0])
 
     def _out(self) -> Path:
         if self._folder is None:

@@ -50,7 +50,9 @@ class Sheet:
         """
         data = with_rows(self.data, self.folder)
         empty = not data.get("body")
-        return model_from({key: each for key, each in data.items() if key != "assembly"} | _NO_BODY if empty else data, "")
+        return model_from(
+            {key: each for key, each in data.items() if key != "assembly"} | _NO_BODY if empty else data, ""
+        )
 
     @cached_property
     def problem(self) -> InputError | None:
