@@ -160,6 +160,7 @@ export class Sheet {
       this.trace(points);
       if (plate) { pen.globalAlpha = 0.22; pen.fill(); pen.globalAlpha = 1; }
       pen.lineWidth = 4; pen.stroke();
+      this.overBody?.(name);
     });
     this.paintMarks(shown.marks.filter(([when]) => when !== "still"), looks);
     this.paintPoints(shown);

@@ -1,7 +1,9 @@
 import { Colours } from "./colours.js";
 import { button, element } from "./elements.js";
 import { Fields } from "./fields.js";
+import { Leave } from "./leave.js";
 import { Link, socketPort } from "./link.js";
+import { Motion } from "./motion.js";
 import { Outline } from "./outline.js";
 import { Photograph } from "./photograph.js";
 import { Sheet } from "./sheet.js";
@@ -40,6 +42,8 @@ class Workbench {
     this.text = new TextPane(this);
     this.photograph = new Photograph(this);
     this.start = new Start(this);
+    new Motion(this);
+    new Leave(this);
     this.showTab("properties");
     const page = document.body?.hasAttribute("data-workbench");
     (page ? document : root).addEventListener("keydown", (event) => this.pressed(event));
