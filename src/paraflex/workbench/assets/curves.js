@@ -167,7 +167,7 @@ export class Chart {
     this.y.close(0.06);
     [this.top, this.bottom, this.right] = [20, pen.high - 32, pen.wide - 10];
     pen.font = FONT;
-    const rows = Math.max(2, Math.floor((this.bottom - this.top) / 34));
+    const rows = Math.max(2, Math.floor((this.bottom - this.top) / 26));
     this.yTicks = layout?.yaxis?.tickvals ?? this.y.ticks(rows);
     this.yTexts = layout?.yaxis?.ticktext ?? this.yTicks.map((at) => shortNumber(at, 5));
     this.left = 12 + Math.max(16, ...this.yTexts.map((text) => pen.measureText(text).width));
@@ -293,7 +293,7 @@ export class Chart {
     pen.setLineDash([]);
     if (curve.mark) paintMark(pen, curve.mark, 11, 5, 4);
     this.values.set(name, value);
-    return element("button", { type: "button", title: "Show or hide", "aria-pressed": !this.hidden.has(name), onclick: () => {
+    return element("button", { type: "button", title: "Show or hide", "aria-pressed": String(!this.hidden.has(name)), onclick: () => {
       if (!this.hidden.delete(name)) this.hidden.add(name);
       this.paint();
     } }, sample, element("span", {}, name), value);

@@ -36,7 +36,7 @@ export class Motion {
     this.clock = element("output", { class: "clock" });
     this.pace = element("select", { "aria-label": "Speed", title: "Speed", onchange: () => { this.speed = Number(this.pace.value); } }, ...PLAY_SPEEDS.map((one) => element("option", { value: one }, `${one} ×`)));
     const loop = button("⟲", "Again and again", () => { this.looping = !this.looping; loop.setAttribute("aria-pressed", this.looping); }, { class: "icon", "aria-pressed": "true" });
-    this.player = element("div", { class: "player", hidden: true }, this.go, button("⏮", "One frame back (←)", () => this.step(-1), { class: "icon" }), button("⏭", "One frame on (→)", () => this.step(1), { class: "icon" }), this.slider, this.clock, this.pace, loop);
+    this.player = element("div", { class: "player", hidden: true }, this.go, button("‹", "One frame back (←)", () => this.step(-1), { class: "icon" }), button("›", "One frame on (→)", () => this.step(1), { class: "icon" }), this.slider, this.clock, this.pace, loop);
     this.auto = element("input", { type: "checkbox", checked: true });
     this.turner = button("↻ Turn the crank", "Turn the crank: a full turn with positions, velocities, accelerations and coupler curves", () => this.turn());
     this.runner = button("▶ Run", "Compute the flexible motion in all modes of the study", () => this.compute(true), { class: "main" });
@@ -210,7 +210,7 @@ export class Motion {
     if (run) run.runs.forEach((name, k) => { if (turn || run.runs.length > 1) chips.push(["run", k, name || "run"]); });
     this.chips.replaceChildren(...chips.map(([kind, k, name]) => {
       const error = kind === "run" && run.found.errors?.find((one) => one.mode === run.runs[k]);
-      return element("button", { type: "button", role: "radio", "aria-checked": this.kind === kind && this.run === k, title: error?.text ?? `Show ${name}`, "data-failed": !!error, onclick: () => this.choose(kind, k, this.playing) }, name);
+      return element("button", { type: "button", role: "radio", "aria-checked": String(this.kind === kind && this.run === k), title: error?.text ?? `Show ${name}`, "data-failed": String(!!error), onclick: () => this.choose(kind, k, this.playing) }, name);
     }));
     const moving = this.kind === "run" ? this.film : null;
     this.tools.hidden = !moving;
@@ -247,7 +247,7 @@ export class Motion {
     if (!recording) return;
     const panels = [...recording.page.panels, ...(recording.tables.length ? [{ title: "Features", tables: recording.tables }] : [])];
     if (!panels.some(({ title }) => title === this.panel)) this.panel = panels[0]?.title;
-    this.tabs.replaceChildren(...panels.map(({ title }) => element("button", { type: "button", role: "tab", "aria-selected": title === this.panel, onclick: () => { this.panel = title; this.fill(); } }, title)));
+    this.tabs.replaceChildren(...panels.map(({ title }) => element("button", { type: "button", role: "tab", "aria-selected": String(title === this.panel), onclick: () => { this.panel = title; this.fill(); } }, title)));
     const { charts = [], tables } = panels.find(({ title }) => title === this.panel) ?? {}, old = new Map(this.charts.map((chart) => [chart.description.identity, chart]));
     this.charts = charts.map((description) => {
       const before = this.beforeOf(description), kept = old.get(description.identity);
