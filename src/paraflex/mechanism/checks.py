@@ -1,6 +1,9 @@
 """Structural checks of a mechanism. A mechanism that passes all of them can be assembled into a system."""
 
 from collections import Counter
+from collections.abc import Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
 from typing import Any
 
 from paraflex.errors import InputError, suggestion
@@ -14,6 +17,8 @@ from .poses import approximate_poses, placed_poses
 from .quantities import JointThat, check_numbers, finite, joints_named, known
 from .rotors import check_actuators
 from .sensors import Sensor
+
+_LOOSE: ContextVar[bool] = ContextVar("loose", default=False)
 
 
 def check_mechanism(mechanism: Members) -> None:
@@ -33,7 +38,8 @@ def check_mechanism(mechanism: Members) -> None:
     check_members_at_joints(mechanism)
     check_relations(mechanism)
     check_assemblies(mechanism)
-    check_connected(mechanism)
+    if not _LOOSE.get():
+        check_connected(mechanism)
     check_task(mechanism)
     check_loads(mechanism)
     for sensor in mechanism.sensors:
@@ -127,6 +133,16 @@ def _check_suspended(mechanism: Members, assembly: Assembly) -> None:
             "distances alone do not determine a body's place", field=f"assembly.{assembly.name}.points", value=name,
             remedy=f'give the place of one of its points: points = {{"{name}.POINT" = [x, y]}}',
         )  # fmt: skip
+
+
+@contextmanager
+def loose_bodies() -> Iterator[None]:
+    """Accept bodies that no joint connects with the ground, as a drawing has them before it is finished."""
+    token = _LOOSE.set(True)
+    try:
+        yield
+    finally:
+        _LOOSE.reset(token)
 
 
 def check_connected(mechanism: Members) -> None:

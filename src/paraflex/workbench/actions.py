@@ -14,6 +14,8 @@ from .moving_points import move_point
 from .sheet import Sheet
 
 _ACTIONS = {**ADDING, **CHANGING, "move-point": move_point}
+# Tables whose entries about deleted members go without a word.
+_BOOKKEEPING = ("assembly", "start")
 
 
 @dataclass(frozen=True)
@@ -57,10 +59,9 @@ def apply(text: str, action: Mapping[str, Any], folder: Path | None = None) -> E
     known(action.get("kind", ""), list(_ACTIONS), "kind", "action")
     before = Sheet(text, folder or Path())
     try:
-        _ = before.data, before.problem
-        known(action.get("assembly") or before.shown, ["", *before.names("assembly")], "assembly", "assembly") if (
-            action["kind"] != "pose"
-        ) else None
+        _ = before.problem
+        if action.get("assembly") and action["kind"] != "pose":
+            known(action["assembly"], before.names("assembly"), "assembly", "assembly")
         after, selected = _ACTIONS[action["kind"]](before, action)
         _check(before, after, action)
     except InputError:
@@ -84,7 +85,8 @@ def what_goes(text: str, names: Sequence[Any]) -> list[dict[str, Any]]:
     data = Sheet(text).data
     things = [thing_of(data, name) for name in names]
     found = falling(data, things)
-    return [{"kind": str(place[0]), "name": spelt(place), "place": list(place)} for place in found[len(things) :]]
+    members = [place for place in found if place not in things and place[0] not in _BOOKKEEPING]
+    return [{"kind": str(place[0]), "name": spelt(place), "place": list(place)} for place in members]
 
 
 def _check(before: Sheet, after: Sheet, action: Mapping[str, Any]) -> None:

@@ -9,6 +9,7 @@ from paraflex.errors import InputError, NumericalError, ParaflexError
 from paraflex.files import Model
 from paraflex.files.library import library_text
 from paraflex.files.model import model_of_text
+from paraflex.mechanism.checks import check_connected, loose_bodies
 from paraflex.mechanism.quantities import known
 from paraflex.plots.scene import Limits
 from paraflex.plots.svg import sketch
@@ -16,8 +17,9 @@ from paraflex.results.posed import Posed, posed, posed_at
 from .document import Document
 from .messages import Message, described
 from .moving import Mover, assemblies
-from .picture import picture
-from .seeing import Seeing, readiness
+from .picture import ground_picture, picture
+from .readiness import readiness
+from .seeing import Seeing
 
 
 class Bench:
@@ -52,6 +54,10 @@ class Bench:
 
     def renew(self) -> None:
         """Read the text again; the picture stays if it cannot be read, and the pose is near the one before."""
+        with loose_bodies():
+            self._renew()
+
+    def _renew(self) -> None:
         self.problem = None
         try:
             model = self.read()
@@ -65,6 +71,10 @@ class Bench:
         if self.mode not in [mode.name for mode in model.mechanism.modes]:
             self.mode = next(iter(model.study.modes), next((one.name for one in model.mechanism.modes), ""))
         self._pose(model)
+        try:
+            check_connected(model.mechanism)
+        except InputError as error:
+            self.problem = self.problem or error
 
     def _pose(self, model: Model) -> None:
         """Move to the pose nearest to the present one in the changed mechanism; open loops are drawn as given."""
@@ -79,7 +89,7 @@ class Bench:
             else:
                 self._moved = False
             self._mover = fresh
-            self._seeing = Seeing(model, fresh)
+            self._seeing = Seeing(model, self._seeing)
         except (InputError, NumericalError) as error:
             self._mover, self._seeing = None, None
             try:
@@ -114,7 +124,9 @@ class Bench:
         if self._mover is not None and self.model is not None:
             shown = posed_at(self.model.mechanism, self._mover.system, self._assembly, self._mover.q[None])
             return picture(shown, self._view)
-        return None if self._open is None else picture(self._open, self._view)
+        if self._open is not None:
+            return picture(self._open, self._view)
+        return ground_picture(self._document.text, self._view) if self.model is None else None
 
     def seen(self, *, quick: bool = False) -> dict[str, Any] | None:
         """Return the numbers of the pose, those that are computed fast or all; None without a pose."""
@@ -125,7 +137,7 @@ class Bench:
 
     def state(self) -> Message:
         """Return what a page shows of the model."""
-        mechanism = None if self.model is None else self.model.mechanism
+        mechanism, seen = None if self.model is None else self.model.mechanism, self.seen()
         return {
             "picture": self.picture(),
             "problem": None if self.problem is None else described(self.problem),
@@ -133,8 +145,8 @@ class Bench:
             "assembly": self._assembly,
             "moved": self._moved,
             "mode": self.mode,
-            "seen": self.seen(),
-            "ready": readiness(self._document.text, self.model, self.problem),
+            "seen": seen,
+            "ready": readiness(self.model, self.problem, seen, {} if self._open is None else dict(self._open.gaps)),
         }
 
     def choose_mode(self, name: str) -> Message:

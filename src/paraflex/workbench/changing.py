@@ -1,7 +1,7 @@
 """Actions that change, rename, copy and delete what is there."""
 
 from collections.abc import Callable, Mapping, Sequence
-from math import pi
+from math import dist, pi
 from typing import Any
 
 from paraflex.errors import InputError
@@ -12,31 +12,53 @@ from paraflex.mechanism.joints import GROUND
 from paraflex.mechanism.poses import Pose
 from .dependents import Use, falling, replaced, spelt, thing_of, uses
 from .edits import renamed, with_value, written
-from .sheet import XY, Action, Done, Sheet, check_name, near, placed
+from .sheet import XY, Action, Done, Sheet, check_name, near, placed, tidy
 
 # Members that are copied together with the joints and points that they name.
 _COPIED = ("joint", "spring", "damper", "friction", "linear_spring", "load", "sensor")
 
 
 def set_value(sheet: Sheet, action: Action) -> Done:
-    """Write a value as typed, or a value of JSON, at a place."""
-    place = _place(action)
-    inside: Any = sheet.data
-    for key in place[:-1]:
-        inside = value_at(inside, (key,)) if isinstance(inside, dict | list) else inside
-    if not (inside is None or isinstance(inside, dict) or (isinstance(inside, list) and place[-1] in range(len(inside)))
-            or (place[0] == "motor" and len(place) == 3)):  # fmt: skip
-        raise InputError(
-            "no such place in the file", field=".".join(map(str, place)), remedy="choose a field that is there"
-        )
+    """Write a value as typed, or a value of JSON, at a place; points at the end of a beam follow its length."""
+    before, place = sheet, _place(action)
+    sheet = _in_full(sheet, place)
+    _check_place(sheet.data, place)
     if "value" in action:
         text = written(action["value"], exact=True)
     else:
         text = _toml_of(sheet.data, place, str(action.get("text", "")).strip())
-    if len(place) > 2 and place[0] == "motor" and isinstance(value_at(sheet.data, place[:2]), str):
-        sheet = sheet.put(place[:2], {"joint": value_at(sheet.data, place[:2])})
+    for point in _at_end(sheet, place):
+        sheet = sheet.with_text(with_value(sheet.text, point, text))
     after = sheet.with_text(with_value(sheet.text, place, text))
-    return placed(sheet, after), ".".join(map(str, place[:2]))
+    return placed(before, after), ".".join(map(str, place[:2]))
+
+
+def _in_full(sheet: Sheet, place: Place) -> Sheet:
+    """Write a joint or motor as a table if a field of it is to be set."""
+    short = value_at(sheet.data, place[:2])
+    if len(place) == 3 and place[0] == "motor" and isinstance(short, str):
+        return sheet.put(place[:2], {"joint": short})
+    if len(place) == 3 and place[0] == "joint" and isinstance(short, list) and isinstance(place[2], str):
+        return sheet.put(place[:2], {"type": "revolute", "points": short})
+    return sheet
+
+
+def _check_place(data: Any, place: Place) -> None:
+    for key in place[:-1]:
+        data = value_at(data, (key,)) if isinstance(data, dict | list) else data
+    inside = isinstance(data, list) and place[-1] in range(len(data))
+    if not (data is None or inside or (isinstance(data, dict) and isinstance(place[-1], str))):
+        remedy = "choose a field that is there"
+        raise InputError("no such place in the file", field=".".join(map(str, place)), remedy=remedy)
+
+
+def _at_end(sheet: Sheet, place: Place) -> list[Place]:
+    """Return the places of the points at the end of a beam whose length is to be set."""
+    points = value_at(sheet.data, ("body", *place[1:2], "points"))
+    if place[0] != "body" or place[2:] != ("length",) or not isinstance(points, dict):
+        return []
+    length = sheet.number(place)
+    return [(*place[:2], "points", name) for name in points if sheet.number((*place[:2], "points", name)) == length]
 
 
 def unset(sheet: Sheet, action: Action) -> Done:
@@ -75,6 +97,8 @@ def rename(sheet: Sheet, action: Action) -> Done:
 def delete(sheet: Sheet, action: Action) -> Done:
     """Delete members together with what depends on them."""
     things = [thing_of(sheet.data, name) for name in action.get("names") or ()]
+    if not things:
+        raise InputError("nothing to delete", field="names", value=action.get("names"), remedy="choose something")
     after, gone = sheet, falling(sheet.data, things)
     whole = [place for place in gone if not any(place[: len(each)] == each for each in gone if each != place)]
     # Items of a list go from its end, as their indices count from its start.
@@ -124,18 +148,18 @@ def _doubled(sheet: Sheet, action: Action, image: Callable[[Pose], Pose], *, mir
     """Add the image of members under new names."""
     before, named = sheet, [thing_of(sheet.data, name) for name in action.get("names") or ()]
     bodies = [str(thing[1]) for thing in named if thing[0] == "body"]
-    if not named or not bodies and not any(thing[0] == GROUND for thing in named):
+    if not named or (not bodies and not any(thing[0] == GROUND for thing in named)):
         raise InputError("nothing to copy", field="names", value=action.get("names"), remedy="choose bodies or points")
-    refs = {use.text for use in uses(sheet.data) if use.kind == "ref" and use.place[0] == "joint"
-            and any(each.place[:2] == use.place[:2] and each.text.partition(".")[0] in bodies for each in uses(sheet.data)
-                    if each.kind == "ref")}  # fmt: skip
-    grounds = [ref.partition(".")[2] for ref in refs if ref.startswith(f"{GROUND}.")]
-    grounds = list(dict.fromkeys([str(thing[1]) for thing in named if thing[0] == GROUND] + sorted(grounds)))
+    chosen = [str(thing[1]) for thing in named if thing[0] == GROUND]
+    grounds = list(dict.fromkeys(chosen + _pivots(sheet, bodies)))
     names: dict[Place, str] = {}
     for name in grounds:
-        x, y = _xy(image(Pose(0.0, sheet.place(f"{GROUND}.{name}", sheet.shown))))
-        names[GROUND, name] = sheet.fresh_point()
-        sheet = sheet.put((GROUND, names[GROUND, name]), [x, y])
+        old = sheet.place(f"{GROUND}.{name}", sheet.shown)
+        new = _xy(image(Pose(0.0, old)))
+        # A point on the axis is its own image.
+        names[GROUND, name] = name if dist(old, new) < 1e-9 else sheet.fresh_point()
+        if names[GROUND, name] != name:
+            sheet = sheet.put((GROUND, names[GROUND, name]), tidy(new))
     frames: dict[str, dict[str, Pose]] = {assembly: {} for assembly in sheet.names("assembly")}
     for body in bodies:
         names["body", body] = new = sheet.fresh(body.rstrip("0123456789") or body, "body")
@@ -149,8 +173,15 @@ def _doubled(sheet: Sheet, action: Action, image: Callable[[Pose], Pose], *, mir
     for table in _COPIED:
         for name, member in before.data.get(table, {}).items():
             sheet = _with_copy(sheet, before, (table, name), member, names, mirrored=mirrored)
-    selected = [spelt((thing[0], name)) for thing, name in names.items()]
-    return placed(before, sheet, frames), selected[-1]
+    return placed(
+        before, sheet, frames
+    ), f"body.{names['body', bodies[-1]]}" if bodies else f"ground.{names[named[-1]]}"
+
+
+def _pivots(sheet: Sheet, bodies: Sequence[str]) -> list[str]:
+    """Return the ground points to which bodies are joined."""
+    pairs = [(joint.a, joint.b) for joint in sheet.joints] + [(joint.b, joint.a) for joint in sheet.joints]
+    return [one.point for one, other in pairs if one.on_ground and other.body in bodies]
 
 
 def _with_copy(
@@ -158,8 +189,10 @@ def _with_copy(
 ) -> Sheet:
     """Add a copy of a member if all that it names is copied."""
     own = [use for use in uses(before.data) if use.place[:2] == thing and use.kind in ("ref", "joint", "body", "own")]
-    renamed_to = {use.place: next((new for each, to in names.items() if (new := replaced(use, each, to)) and new != use.text),
-                                  None) for use in own}  # fmt: skip
+    renamed_to = {
+        use.place: next((new for each, to in names.items() if (new := replaced(use, each, to)) is not None), None)
+        for use in own
+    }
     if not own or any(new is None and use.kind != "own" for use, new in zip(own, renamed_to.values(), strict=True)):
         return sheet
     table, name = str(thing[0]), str(thing[1])
@@ -241,5 +274,6 @@ def _value(sheet: Sheet, use: Use) -> list[float]:
 
 
 CHANGING: dict[str, Callable[[Sheet, Action], Done]] = {
-    "set": set_value, "unset": unset, "rename": rename, "copy": copied, "mirror": mirrored, "delete": delete, "pose": pose,
+    "set": set_value, "unset": unset, "rename": rename, "copy": copied, "mirror": mirrored, "delete": delete,
+    "pose": pose,
 }  # fmt: skip

@@ -81,7 +81,7 @@ def thing_of(data: Mapping[str, Any], name: Any) -> Place:
         place = tuple(name)
     else:
         head, _, rest = str(name).partition(".")
-        if rest and head not in ModelTable.model_fields or (head == "body" and "body" in data.get("body", {})):
+        if (rest and head not in ModelTable.model_fields) or (head == "body" and "body" in data.get("body", {})):
             place: Place = ("body", head, "points", rest)
         else:
             place = (head, rest) if rest else (head,)
@@ -93,7 +93,11 @@ def thing_of(data: Mapping[str, Any], name: Any) -> Place:
 
 def spelt(thing: Place) -> str:
     """Return the name of a thing as a person reads it: "body.link1", or "link1.B" for a point."""
-    return f"{thing[1]}.{thing[3]}" if thing[0] == "body" and len(thing) == 4 else ".".join(map(str, thing))
+    return (
+        f"{thing[1]}.{thing[3]}"
+        if thing[0] == "body" and thing[2:3] == ("points",) and len(thing) == 4
+        else ".".join(map(str, thing))
+    )
 
 
 def falling(data: Mapping[str, Any], things: Iterable[Place]) -> list[Place]:
@@ -166,7 +170,7 @@ def _ref(text: str, thing: Place, name: str) -> str | None:
     body, _, point = text.partition(".")
     if thing == ("body", body):
         return f"{name}.{point}"
-    if thing == (GROUND, point) and body == GROUND or thing == ("body", body, "points", point):
+    if (thing == (GROUND, point) and body == GROUND) or thing == ("body", body, "points", point):
         return f"{body}.{name}"
     return None
 
@@ -214,7 +218,7 @@ def _also(data: Mapping[str, Any], thing: Place) -> Iterator[Place]:
     """Yield places that lose their meaning without a thing although they do not name it."""
     if thing[0] == "motor":
         for k, mode in enumerate(value_at(data, ("study", "modes")) or []):
-            if _SIGNS.match(str(mode).partition(" ")[0]):
+            if _SIGNS.match(str(mode).partition(" ")[0]) and mode not in data.get("mode", {}):
                 yield ("study", "modes", k)
     if thing == ("end_effector",):
         places: list[Place] = [("payload",), ("study", "orientation"), ("study", "path"), ("study", "paths")]

@@ -8,9 +8,8 @@ from typing import Any
 
 from paraflex.files.document import document_text
 from paraflex.files.fields import Place, value_at
-from paraflex.files.read import parse_toml
 from paraflex.files.schema import ModelTable
-from .spans import Entry, entries_of
+from .spans import Entry, data_of, entries_of
 
 _COMMA = re.compile(r"\s*,[ \t]*")
 _BLANK_LINES = re.compile(r"(?:[ \t]*\r?\n)+")
@@ -51,34 +50,34 @@ def with_value(text: str, place: Sequence[str | int], value: str) -> str:
     entry = _entry(text, place)
     if entry is not None:
         edited = text[: entry.value[0]] + value + text[entry.value[1] :]
-    elif value_at(parse_toml(text), place) is not None:
+    elif value_at(data_of(text), place) is not None:
         edited = ""  # a table over several headers or dotted keys, which is written anew
     else:
         edited = _with_new(text, place, value)
-    return _checked(text, edited, place, parse_toml(f"value = {value}")["value"])
+    return _checked(text, edited, place, data_of(f"value = {value}")["value"])
 
 
 def with_table(text: str, place: Sequence[str], table: Mapping[str, Any], *, exact: bool = False) -> str:
     """Add a table with a header of its own behind the others of its kind."""
     members = [f"{key_text(key)} = {written(one, exact=exact)}" for key, one in table.items()]
     edited = _with_section(text, tuple(place), [f"[{'.'.join(map(key_text, place))}]", *members])
-    return _checked(text, edited, tuple(place), parse_toml(f"value = {written(table, exact=exact)}")["value"])
+    return _checked(text, edited, tuple(place), data_of(f"value = {written(table, exact=exact)}")["value"])
 
 
 def with_item(text: str, place: Sequence[str | int], value: str) -> str:
     """Append an item, given as TOML, to the list at a place; the list is added if it is missing."""
-    entry, old = _entry(text, tuple(place)), value_at(parse_toml(text), place)
+    entry, old = _entry(text, tuple(place)), value_at(data_of(text), place)
     if entry is None or not old:
         return with_value(text, place, f"[{value}]")
     last = _entry(text, (*place, len(old) - 1))
     assert last is not None
     edited = text[: last.whole[1]] + f", {value}" + text[last.whole[1] :]
-    return _checked(text, edited, tuple(place), [*old, parse_toml(f"value = {value}")["value"]])
+    return _checked(text, edited, tuple(place), [*old, data_of(f"value = {value}")["value"]])
 
 
 def without(text: str, place: Sequence[str | int]) -> str:
     """Remove the value or table at a place, and tables that are empty then."""
-    place, data = tuple(place), parse_toml(text)
+    place, data = tuple(place), data_of(text)
     if value_at(data, place) is None:
         return text
     found = [one for one in entries_of(text) if one.place[: len(place)] == place]
@@ -88,9 +87,8 @@ def without(text: str, place: Sequence[str | int]) -> str:
         edited = _closed(edited[:start], edited[end:])
     edited = _checked(text, edited, place)
     above = place[:-1]
-    empty = (
-        above and value_at(parse_toml(edited), above) in (None, {}, []) and (len(above) != 2 or above[0] == "assembly")
-    )
+    rest = value_at(data_of(edited), above) if above else 0
+    empty = rest == [] or (rest == {} and isinstance(above[-1], str) and (len(above) != 2 or above[0] == "assembly"))
     return without(edited, above) if empty else edited
 
 
@@ -215,10 +213,10 @@ def _joined(cuts: Sequence[tuple[int, int]]) -> list[tuple[int, int]]:
 
 def _checked(text: str, edited: str, place: Place, value: Any = None) -> str:
     """Return an edited text if it has the data asked for; else the data are written by `document_text`."""
-    data = copy.deepcopy(parse_toml(text))
+    data = copy.deepcopy(data_of(text))
     _put(data, place, value)
     try:
-        found = parse_toml(edited)
+        found = data_of(edited)
         if edited and (found == data if value is not None else _filled(found) == _filled(data)):
             return edited
     except ValueError:

@@ -8,7 +8,11 @@ from string import Template
 from paraflex.plots.themes import THEMES
 
 # Modules in the order in which they are joined; each imports only from those before it.
-_MODULES = ("elements.js", "colours.js", "link.js", "names.js", "sheet.js", "icons.js", "tools.js", "fields.js", "outline.js", "text.js", "photograph.js", "start.js", "curves.js", "recordings.js", "motion.js", "leave.js", "workbench.js")
+_MODULES = (
+    "elements.js", "colours.js", "link.js", "names.js", "places.js", "sheet.js", "icons.js", "dragging.js", "drawing.js", "painting.js",
+    "tools.js", "fields.js", "outline.js", "text.js", "photograph.js", "start.js", "curves.js", "recordings.js", "motion.js", "seeing.js", "leave.js",
+    "workbench.js",
+)  # fmt: skip
 # Scripts of reports that stand before the modules, and the style sheets.
 _SHARED, _STYLES = ("unpacking.js",), ("workbench.css", "panels.css")
 _IMPORT = re.compile(r"^import .*?;\n", re.MULTILINE | re.DOTALL)

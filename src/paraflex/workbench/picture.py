@@ -8,14 +8,17 @@ import numpy as np
 from paraflex.arrays import Array, Numbers
 from paraflex.mechanism import GROUND, Body, LumpedMass, Mechanism, PointRef
 from paraflex.mechanism.poses import Pose, local_points
-from paraflex.plots.marks import LOOKS, moving_marks, still_marks
+from paraflex.plots.marks import LOOKS, moving_marks, still_marks, support
 from paraflex.plots.model_drawing import posed_scene
 from paraflex.plots.model_marks import acting_arrows, sensor_marks
 from paraflex.plots.scene import Limits, Scene, is_plate
 from paraflex.results.posed import Posed
+from .sheet import Sheet
 
 # Digits behind the point of a position on the page [m].
 _DIGITS = 7
+# Margin around the points of a sheet without bodies [m].
+_AROUND = 0.15
 
 
 def picture(shown: Posed, view: Limits | None = None) -> dict[str, Any]:
@@ -46,6 +49,29 @@ def picture(shown: Posed, view: Limits | None = None) -> dict[str, Any]:
         "angles": {name: round(angle, 9) for name, angle in shown.angles.items()},
         "frames": {body.name: _frame(shown, body) for body in mechanism.bodies},
     }
+
+
+def ground_picture(text: str, view: Limits | None = None) -> dict[str, Any] | None:
+    """Return the points of the ground of a file without bodies; None if it has none."""
+    try:
+        sheet = Sheet(text)
+        ground = {name: sheet.place(f"{GROUND}.{name}", "") for name in sheet.names("ground")}
+    except ParaflexError:
+        return None
+    if not ground:
+        return None
+    xs, ys = zip(*ground.values(), strict=True)
+    limits = Limits(min(xs) - _AROUND, max(xs) + _AROUND, min(ys) - _AROUND, max(ys) + _AROUND)
+    marks = []
+    for place in ground.values():
+        lines, strokes = support(np.array(place), view or limits)
+        marks += [["still", "ground", "", _line(line)] for line in lines]
+        marks += [["still", "hatching", "", _line(line)] for line in strokes]
+    return {
+        "limits": [limits.left, limits.bottom, limits.right, limits.top], "bodies": [], "marks": marks,
+        "points": [[f"{GROUND}.{name}", *_pair(np.array(place))] for name, place in ground.items()], "joints": [],
+        "effector": None, "lumps": [], "path": [], "open": {}, "problems": [], "angles": {}, "frames": {},
+    }  # fmt: skip
 
 
 def all_points(mechanism: Mechanism) -> Iterable[PointRef]:

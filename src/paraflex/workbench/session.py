@@ -9,6 +9,7 @@ from typing import Any
 
 from paraflex.errors import InputError, ParaflexError, suggestion
 from paraflex.files.library import library_names, library_text
+from paraflex.mechanism.checks import loose_bodies
 from .actions import apply, what_goes
 from .bench import Bench, library
 from .bending import drag_force, linear
@@ -40,6 +41,7 @@ class Session:
         self._made: list[Path] = []
         self._folder: tempfile.TemporaryDirectory[str] | None = None
         self._revision = 0
+        self._live: Any = None
         self._runner: Runner | None = None
         self._requests = {
             name.removeprefix("_do_"): getattr(self, name) for name in dir(type(self)) if name.startswith("_do_")
@@ -50,7 +52,7 @@ class Session:
         number = message.get("id") if isinstance(message, dict) else None
         number = number if isinstance(number, int) else None
         try:
-            with self._lock:
+            with self._lock, loose_bodies():
                 asked = field(message, "do", str)
                 if asked not in self._requests:
                     remedy = suggestion(asked, [*self._requests])
@@ -96,7 +98,10 @@ class Session:
 
     def _do_act(self, message: Message) -> Message:
         edited = apply(self.document.text, field(message, "action", dict), self.document.folder)
-        return {**self._changed(edited.text), "selected": edited.selected, "note": edited.note}
+        # What a slider changes while it is moved is one step.
+        live, self._live = self._live, message.get("live")
+        self.document.change(edited.text, same=live is not None and live == self._live)
+        return {**self._renewed(), "selected": edited.selected, "note": edited.note}
 
     def _do_goes(self, message: Message) -> Message:
         return {"goes": what_goes(self.document.text, field(message, "names", list))}
@@ -202,7 +207,7 @@ class Session:
             return self._address(report(text, folder, place, source=source))
         if out == "film":
             return self._address(film(text, folder, place / f"{source}.gif", source=source))
-        return self._address(figures(text, folder, place / f"{source}.{out}", source=source)[0])
+        return self._address(figures(text, folder, place / source, source=source, kinds=[out])[0])
 
     def _out(self) -> Path:
         if self._folder is None:

@@ -9,20 +9,31 @@ from typing import Any
 
 from paraflex.dynamics import closure_of, reference_pose, standing_system
 from paraflex.errors import InputError, NumericalError, suggestion
-from paraflex.expressions.evaluate import evaluate_parameters, expressed_in
-from paraflex.expressions.evaluate import evaluate as evaluate_text
+from paraflex.expressions.evaluate import evaluate as evaluate_text, evaluate_parameters, expressed_in
 from paraflex.files.fields import value_at
 from paraflex.files.model import Model, model_from
-from paraflex.files.read import parse_toml
 from paraflex.files.rows import with_rows
 from paraflex.mechanism import Assembly, Joint, Mechanism, PointRef
 from paraflex.mechanism.joints import GROUND
 from paraflex.mechanism.masses import with_any_masses
 from paraflex.mechanism.poses import Pose, approximate_poses, local_points, placed_poses
 from .edits import with_item, with_table, with_value, without, written
+from .spans import data_of
 
 XY = tuple[float, float]
 Action = Mapping[str, Any]
+
+
+class Frame(Pose):
+    """Pose of a body whose position is known."""
+
+    @property
+    def origin(self) -> XY:
+        """Position of the frame's origin [m]."""
+        assert self.position is not None
+        return self.position
+
+
 # Stands in for the bodies of a sheet without any, so that the rest of the file is read and checked.
 _NO_BODY = {"body": {"none": {"type": "rigid", "points": {"none": [0.0, 0.0]}}}}
 
@@ -37,7 +48,7 @@ class Sheet:
     @cached_property
     def data(self) -> dict[str, Any]:
         """Parsed data of the text."""
-        return parse_toml(self.text)
+        return data_of(self.text)
 
     @cached_property
     def model(self) -> Model:
@@ -110,10 +121,18 @@ class Sheet:
         body, _, point = ref.partition(".")
         if body == GROUND and point in self.names("ground"):
             return self.number(("ground", point, 0)), self.number(("ground", point, 1))
-        frame = self.frames.get(assembly, {}).get(body)
-        if frame is None or frame.position is None or point not in self.locals[body]:
+        if point not in self.locals.get(body, {}):
             raise self.unknown_point(ref)
-        return frame.place_of(self.locals[body][point])
+        return self.frame(body, assembly).place_of(self.locals[body][point])
+
+    def frame(self, body: str, assembly: str) -> "Frame":
+        """Return the pose of a body in an assembly; an error if it is not known."""
+        found = self.frames.get(assembly, {}).get(body)
+        if found is None or found.position is None:
+            raise self.problem or InputError(
+                "its place is not known", field=f"body.{body}", remedy="give its angle in an assembly"
+            )
+        return Frame(found.angle, found.position)
 
     def unknown_point(self, ref: str) -> InputError:
         """Return the error for a point that does not exist, or has no known place."""

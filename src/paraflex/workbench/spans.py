@@ -5,8 +5,10 @@ import tomllib
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import lru_cache
+from typing import Any
 
 from paraflex.files.fields import Place
+from paraflex.files.read import parse_toml
 
 _BLANK = re.compile(r"[ \t]*")
 _BETWEEN = re.compile(r"(?:[ \t\r\n]|#[^\n]*)*")
@@ -49,7 +51,13 @@ class Entry:
     section: int
 
 
-@lru_cache(maxsize=8)
+@lru_cache(maxsize=16)
+def data_of(text: str) -> dict[str, Any]:
+    """Return the data of a text, not to be modified; see `parse_toml` for the errors."""
+    return parse_toml(text)
+
+
+@lru_cache(maxsize=16)
 def entries_of(text: str) -> tuple[Entry, ...]:
     """Return all entries of a text in their order; those inside a value follow the entry of that value."""
     return tuple(_entries(text))

@@ -72,7 +72,7 @@ class Scale {
   ticks(count) { return this.log ? logTicks(this.low, this.high, count).map((at) => 10 ** at) : roundTicks(this.low, this.high, count); }
 }
 
-// A chart; `clock` has the time, the run, the abscissa `over` (0 for the time) and seek(time).
+// A chart; `clock` has the time, the index of the run, the abscissa `over` (0 for the time) and seek(time).
 export class Chart {
   constructor(bench, clock, description, page) {
     Object.assign(this, { bench, clock, description, page, before: null, choice: 0, hidden: new Set(), hover: null });
@@ -102,7 +102,7 @@ export class Chart {
   renew(description, page, before) { Object.assign(this, { description, page, before }); this.paint(); }
 
   isOverTime() { return this.description.over_time && !this.clock.over; }
-  isShown(curve, run = this.clock.run) { return (curve.shown === null || curve.shown.includes(run)) && (curve.choice === null || curve.choice === this.choice); }
+  isShown(curve, run = this.clock.index) { return (curve.shown === null || curve.shown.includes(run)) && (curve.choice === null || curve.choice === this.choice); }
   get label() { const { y } = this.description; return Array.isArray(y) ? y[y.length > 1 ? this.choice : 0] : y; }
   get over() { return this.description.over_time && this.clock.over ? this.page.abscissae[this.clock.over - 1] : null; }
 
@@ -118,13 +118,13 @@ export class Chart {
   drawn() {
     const shown = this.description.curves.filter((curve) => curve.mark !== "bar" && this.isShown(curve) && !this.hidden.has(curve.name));
     const beside = new Set(shown.map((curve) => curve.run).filter((run) => run !== null)).size > 1;
-    const own = shown.map((curve) => ({ curve, x: this.xs(curve, this.page, this.clock.run), y: this.page.rows[curve.y], strong: beside && curve.run === this.clock.run, weak: beside && curve.run !== this.clock.run }));
+    const own = shown.map((curve) => ({ curve, x: this.xs(curve, this.page, this.clock.index), y: this.page.rows[curve.y], strong: beside && curve.run === this.clock.index, weak: beside && curve.run !== this.clock.index }));
     return [...this.drawnBefore(), ...own];
   }
 
   drawnBefore() {
     if (!this.before) return [];
-    const { description, page } = this.before, run = page.runs.indexOf(this.page.runs[this.clock.run]);
+    const { description, page } = this.before, run = page.runs.indexOf(this.page.runs[this.clock.index]);
     if (run < 0) return [];
     return description.curves.filter((curve) => !curve.mark && !curve.desired && this.isShown(curve, run) && (curve.run ?? run) === run && !this.hidden.has(curve.name))
       .map((curve) => ({ curve, x: this.xs(curve, page, run), y: page.rows[curve.y], ghost: true }));

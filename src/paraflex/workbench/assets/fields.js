@@ -21,11 +21,8 @@ export class Fields {
     const { selected, state } = this.bench;
     if (selected.length > 1) return [];
     if (!selected.length) return [["parameters"]];
-    const [chosen] = selected, joint = chosen.kind === "joint" && (state.picture?.joints ?? []).find(([name]) => name === chosen.name);
-    const further = joint ? [["motor", joint[4]], ["prescribed", joint[5]]].filter(([, name]) => name) : [];
-    const at = (state.outline ?? []).filter(({ on }) => on && on === `${chosen.kind}.${chosen.name}`).map(({ place }) => place);
-    const known = new Set(further.map(String));
-    return [this.bench.placeOf(chosen), ...further, ...at.filter((one) => !known.has(String(one)))];
+    const [chosen] = selected, own = chosen.kind === "joint" ? this.bench.owned(chosen) : [];
+    return [this.bench.placeOf(chosen), ...own.filter(([kind]) => kind !== "body" && kind !== "joint")];
   }
 
   async refresh() {
@@ -34,7 +31,7 @@ export class Fields {
     do {
       this.again = false;
       const places = this.places();
-      const found = await Promise.all(places.map((place) => this.bench.link.ask("fields", { place }).catch((error) => ({ fields: [], more: [], error }))));
+      const found = await Promise.all(places.map((place) => this.bench.link.ask("fields", { place }).catch((error) => ({ fields: [], error }))));
       if (!this.again) this.show(places, found);
     } while (this.again);
     this.asking = false;
@@ -42,7 +39,7 @@ export class Fields {
 
   // Rows stay while their fields do, so that nobody loses the place where they type.
   show(places, found) {
-    const keys = JSON.stringify([places, found.map(({ fields, more }) => [fields.map(({ place, choices }) => [place, choices]), (more ?? []).map(({ label }) => label)]), this.bench.selected]);
+    const keys = JSON.stringify([places, found.map(({ fields, addable: more }) => [fields.map(({ place, choices }) => [place, choices]), (more ?? []).map(({ label }) => label)]), this.bench.selected]);
     if (keys === this.keys) {
       this.rows.forEach((row, k) => row.update(found.flatMap(({ fields }) => fields)[k]));
       return;
@@ -56,9 +53,10 @@ export class Fields {
   head() {
     const { bench } = this, { selected } = bench;
     if (!selected.length) return [element("p", { class: "soft" }, "Nothing is selected. Parameters of the file:")];
-    const act = element("div", { class: "row" },
+    const drawn = selected.some(({ kind }) => kind === "body" || kind === "point"), on = (made) => (drawn ? made : "");
+    const act = element("div", { class: "row" }, ...[
       button("Copy", "Copy (Ctrl+D)", () => bench.copy()), button("Mirror ⇋", "Mirror at the vertical through the origin", () => bench.mirror("y")),
-      button("Mirror ⥮", "Mirror at the horizontal through the origin", () => bench.mirror("x")), button("Delete", "Delete (Del)", () => bench.remove(), { class: "danger" }));
+      button("Mirror ⥮", "Mirror at the horizontal through the origin", () => bench.mirror("x"))].map(on), button("Delete", "Delete (Del)", () => bench.remove(), { class: "danger" }));
     if (selected.length > 1) return [element("h2", {}, `${selected.length} things are selected`), element("p", { class: "soft" }, selected.map((one) => bench.nameOf(one)).join(", ")), act];
     return [this.naming(selected[0]), act];
   }
@@ -92,7 +90,7 @@ export class Fields {
     setTimeout(() => found()?.input.focus(), 150);
   }
 
-  section(place, { fields, more, error }, number) {
+  section(place, { fields, addable: more, error }, number) {
     const slides = place[0] === "parameters", part = element("section", {});
     if (number) {
       const [kind, name] = place;
@@ -103,7 +101,7 @@ export class Fields {
       this.rows.push(row);
       part.append(row.box);
     }
-    if (error) part.append(element("p", { class: "wrong" }, error.text ?? String(error)));
+    if (error && !slides) part.append(element("p", { class: "wrong" }, error.text ?? String(error)));
     if (slides) part.append(this.newParameter(fields));
     else if (more?.length) part.append(this.adder(place, more));
     return part;
@@ -140,7 +138,7 @@ class Row {
     const listen = (what, does) => this.input.addEventListener(what, does);
     listen("change", () => this.commit());
     listen("keydown", (event) => this.key(event));
-    const label = element("span", { class: "label", title: field.help ?? "" }, field.label);
+    const label = element("span", { class: "label", title: field.help ?? "" }, /^\d$/.test(field.label) ? `point ${field.label}` : field.label);
     const remove = field.optional ? button("×", `Remove ${field.label}`, () => this.remove(), { class: "icon small" }) : null;
     this.box = element("label", { class: "field", title: field.help ?? "" }, label, this.input, element("span", { class: "unit" }, field.unit ?? ""), remove, this.value, this.wrong);
     if (slides && Number.isFinite(field.value) && PLAIN.test(field.text)) this.addSlider(field);

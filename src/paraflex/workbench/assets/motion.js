@@ -12,7 +12,7 @@ export class Motion {
   constructor(bench) {
     this.bench = bench;
     this.sheet = bench.sheet;
-    Object.assign(this, { recordings: { turn: null, run: null }, kind: "", run: 0, over: 0, time: 0, playing: false, looping: true, speed: 1, magnify: 1, before: null, charts: [], number: -1, playable: false });
+    Object.assign(this, { recordings: { turn: null, run: null }, kind: "", index: 0, over: 0, time: 0, playing: false, looping: true, speed: 1, magnify: 1, before: null, charts: [], number: -1, playable: false });
     bench.motion = this;
     this.layOut();
     this.sheet.under.push((pen) => this.paintUnder(pen));
@@ -39,7 +39,7 @@ export class Motion {
     this.player = element("div", { class: "player", hidden: true }, this.go, button("‹", "One frame back (←)", () => this.step(-1), { class: "icon" }), button("›", "One frame on (→)", () => this.step(1), { class: "icon" }), this.slider, this.clock, this.pace, loop);
     this.auto = element("input", { type: "checkbox", checked: true });
     this.turner = button("↻ Turn the crank", "Turn the crank: a full turn with positions, velocities, accelerations and coupler curves", () => this.turn());
-    this.runner = button("▶ Run", "Compute the flexible motion in all modes of the study", () => this.compute(true), { class: "main" });
+    this.runner = button("▶ Run", "Compute the flexible motion in all modes of the study", () => this.run(true), { class: "main" });
     this.bar = element("div", { class: "progress", role: "progressbar", "aria-label": "Progress of the run", hidden: true }, element("i", {}));
     this.chips = element("div", { class: "chips", role: "radiogroup", "aria-label": "Motion that is shown" });
     this.opener = button("Charts ▴", "Charts and tables of the motion", () => this.open(this.drawer.hidden), { "aria-expanded": "false", hidden: true });
@@ -143,7 +143,7 @@ export class Motion {
   // The instant on the sheet, in the charts and beside the slider.
   show() {
     const { recording, film, time } = this;
-    if (film) this.sheet.picture = film.picture(this.run, time, this.magnify, this.bench.state.picture?.effector);
+    if (film) this.sheet.picture = film.picture(this.index, time, this.magnify, this.bench.state.picture?.effector);
     this.slider.value = (1000 * (time - recording.begin)) / (recording.end - recording.begin);
     const text = this.clockText();
     this.clock.textContent = text;
@@ -164,7 +164,7 @@ export class Motion {
 
   take(recording, { play = true } = {}) {
     this.recordings[recording.kind] = recording;
-    this.choose(recording.kind, this.kind === recording.kind ? this.run : -1, play);
+    this.choose(recording.kind, this.kind === recording.kind ? this.index : -1, play);
   }
 
   // Show a motion: the turn, or a run by its number (-1 for that of the chosen mode).
@@ -174,7 +174,7 @@ export class Motion {
     const { recording } = this;
     this.shown = recording;
     const wished = recording.runs.indexOf(this.bench.state.mode ?? "");
-    this.run = run >= 0 && run < recording.runs.length ? run : wished >= 0 ? wished : recording.page.selected ?? 0;
+    this.index = run >= 0 && run < recording.runs.length ? run : wished >= 0 ? wished : recording.page.selected ?? 0;
     if (fresh) this.begin(recording, before);
     this.player.hidden = this.opener.hidden = false;
     this.fillChips();
@@ -204,13 +204,19 @@ export class Motion {
     this.recording && film ? this.setMagnify(film.bends ? least : 1) : null;
   }
 
+  // The mode of the pose was chosen: its run is shown.
+  chooseMode(name) {
+    const { run } = this.recordings, index = run ? run.runs.indexOf(name) : -1;
+    if (this.kind === "run" && index >= 0) this.choose("run", index, this.playing);
+  }
+
   fillChips() {
     const { turn, run } = this.recordings, chips = [];
     if (turn && run) chips.push(["turn", 0, "turn"]);
     if (run) run.runs.forEach((name, k) => { if (turn || run.runs.length > 1) chips.push(["run", k, name || "run"]); });
     this.chips.replaceChildren(...chips.map(([kind, k, name]) => {
       const error = kind === "run" && run.found.errors?.find((one) => one.mode === run.runs[k]);
-      return element("button", { type: "button", role: "radio", "aria-checked": String(this.kind === kind && this.run === k), title: error?.text ?? `Show ${name}`, "data-failed": String(!!error), onclick: () => this.choose(kind, k, this.playing) }, name);
+      return element("button", { type: "button", role: "radio", "aria-checked": String(this.kind === kind && this.index === k), title: error?.text ?? `Show ${name}`, "data-failed": String(!!error), onclick: () => this.choose(kind, k, this.playing) }, name);
     }));
     const moving = this.kind === "run" ? this.film : null;
     this.tools.hidden = !moving;
@@ -220,7 +226,7 @@ export class Motion {
 
   // Main numbers of the shown run, and what was found.
   showResults() {
-    const { recording } = this, one = recording.numbers[this.run], parts = [];
+    const { recording } = this, one = recording.numbers[this.index], parts = [];
     if (one) {
       if (one.status && one.status !== "complete" && one.status !== "done") parts.push(one.status);
       if (one.error_rms !== null && one.error_rms !== undefined) parts.push(`tracking error ${quantity(one.error_rms, "m")}`);
@@ -230,7 +236,7 @@ export class Motion {
       if (torques.length) parts.push(`peak torque ${torques.map(([motor, value]) => `${motor} ${quantity(value, "N m")}`).join(", ")}`);
     }
     this.results.textContent = parts.join(" · ");
-    const failed = recording.found.errors?.find((each) => each.mode === recording.runs[this.run]);
+    const failed = recording.found.errors?.find((each) => each.mode === recording.runs[this.index]);
     const lines = [...(failed ? [failed.text] : []), ...recording.findings, recording.found.note, recording.found.loads_problem && this.kind === "turn" ? `no torques: ${recording.found.loads_problem}` : ""].filter(Boolean);
     this.tell(lines, failed || recording.found.verdict === "wrong" ? "error" : "note");
   }
@@ -279,7 +285,7 @@ export class Motion {
     this.stop();
     this.bar.hidden = true;
     this.bench.parts.dock.classList.toggle("old", !!this.recording);
-    if (this.auto.checked && ready?.ok) this.compute(false);
+    if (this.auto.checked && ready?.ok) this.run(false);
     else if (this.number >= 0) this.bench.link.ask("cancel").catch(() => null);
   }
 
@@ -295,7 +301,8 @@ export class Motion {
     this.open(true);
   }
 
-  async compute(asked) {
+  // Compute the flexible motion; `asked` if a person waits for it.
+  async run(asked = true) {
     this.asked = asked;
     this.progress("begins", 0);
     const found = await (asked ? this.bench.request("run") : this.bench.link.ask("run").catch(() => null));
@@ -325,7 +332,7 @@ export class Motion {
     if (event.state === "done") this.bar.hidden = true;
     const { tools } = this.bench, free = this.asked || (!tools.held && tools.tool.name === "select" && !(this.kind === "turn" && this.playing));
     if (free) this.take(recording, { play: this.playing || event.state === "preview" || newer });
-    else { this.recordings.run = recording; if (this.kind !== "turn") this.choose("run", this.kind ? this.run : -1, false); else this.fillChips(); }
+    else { this.recordings.run = recording; if (this.kind !== "turn") this.choose("run", this.kind ? this.index : -1, false); else this.fillChips(); }
     this.settled();
   }
 
@@ -348,15 +355,15 @@ export class Motion {
     const found = await this.bench.request("assembly", { number });
     if (!found) return;
     this.stop();
-    this.bench.tools.posed.hidden = false;
-    this.bench.tools.dragged(found);
+    this.bench.tools.dragging.posed.hidden = false;
+    this.bench.tools.dragging.dragged(found);
   }
 
   async showLinear() {
     const found = await this.bench.request("linear");
     if (!found?.page) return;
     const page = await readPage(found.page), holder = element("div", { class: "plots" });
-    const clock = { time: 0, run: page.selected ?? 0, over: 0, seek() {} };
+    const clock = { time: 0, index: page.selected ?? 0, over: 0, seek() {} };
     const charts = page.panels.flatMap((panel) => panel.charts).map((description) => new Chart(this.bench, clock, description, page));
     holder.append(...charts.map((chart) => chart.figure), ...(found.tables ?? []).map(tableOf));
     this.bench.dialog("Linear model about this pose", holder).classList.add("wide");
@@ -371,10 +378,10 @@ export class Motion {
     const { film, sheet } = this;
     pen.lineJoin = pen.lineCap = "round";
     if (this.kind === "run" && this.before?.film && this.ghosted.checked) {
-      const run = this.before.runs.indexOf(this.recording.runs[this.run]);
+      const run = this.before.runs.indexOf(this.recording.runs[this.index]);
       if (run >= 0) this.ghost(pen, this.before.film.lines(this.before.film.stations(run, Math.min(this.time, this.before.end), this.magnify)), 0.55, 3);
     }
-    if (film?.bends && this.magnify > 1) this.ghost(pen, film.lines(film.stations(this.run, this.time, 0)), 0.6, 1.2, [3, 4]);
+    if (film?.bends && this.magnify > 1) this.ghost(pen, film.lines(film.stations(this.index, this.time, 0)), 0.6, 1.2, [3, 4]);
     if (film?.path) this.paintDesired(pen, film.path);
     for (const { path } of this.recording.trails) { pen.strokeStyle = sheet.colour("trail"); pen.globalAlpha = 0.45; pen.lineWidth = 1.6; sheet.trace(path); pen.stroke(); }
   }
@@ -386,7 +393,7 @@ export class Motion {
   }
 
   paintDesired(pen, { values, runs }) {
-    const long = values.length / runs, from = runs > 1 ? this.run * long : 0, points = [];
+    const long = values.length / runs, from = runs > 1 ? this.index * long : 0, points = [];
     for (let k = from; k < from + long; k += 2) points.push(Number.isFinite(values[k]) ? [values[k], values[k + 1]] : null);
     pen.strokeStyle = this.sheet.colour("desired"); pen.lineWidth = 1.4; pen.setLineDash([6, 5]); this.sheet.trace(points); pen.stroke(); pen.setLineDash([]);
   }
@@ -395,7 +402,7 @@ export class Motion {
     if (!this.isPlayed) return;
     const { film, sheet } = this;
     pen.strokeStyle = sheet.colour("trail"); pen.lineWidth = 2.2; pen.lineJoin = "round";
-    if (!this.recording.trails.length) for (const tip of film?.tips[this.run] ?? []) { sheet.trace(film.trail(this.run, tip, this.time, this.magnify)); pen.stroke(); }
+    if (!this.recording.trails.length) for (const tip of film?.tips[this.index] ?? []) { sheet.trace(film.trail(this.index, tip, this.time, this.magnify)); pen.stroke(); }
     const page = this.recording.page, times = page.rows[page.time];
     for (const { path, cusps, crunodes } of this.recording.trails) {
       const [before] = between(times, this.time);
@@ -403,7 +410,7 @@ export class Motion {
       for (const one of cusps) this.special(pen, one.position, "cusp");
       for (const one of crunodes) this.special(pen, one.position, "crunode");
     }
-    const stopped = film?.stopped(this.run);
+    const stopped = film?.stopped(this.index);
     if (stopped !== null && stopped !== undefined && this.time > stopped) { pen.fillStyle = sheet.colour("mark"); pen.font = "600 13px system-ui, sans-serif"; pen.fillText(`this run ended at ${stopped.toFixed(3)} s`, 14, 24); }
     if (this.coloursStress) this.paintScaleOfStress(pen);
   }
@@ -432,7 +439,7 @@ export class Motion {
     if (!this.coloursStress) return;
     const { sheet: { pen }, film } = this, body = film.bodies.find(([one]) => one === name);
     if (!body) return;
-    if (this.stressTime !== this.time || this.stressRun !== this.run) { this.shares = this.recording.stressAt(this.run, this.time); [this.stressTime, this.stressRun] = [this.time, this.run]; }
+    if (this.stressTime !== this.time || this.stressRun !== this.index) { this.shares = this.recording.stressAt(this.index, this.time); [this.stressTime, this.stressRun] = [this.time, this.index]; }
     const [, from, to] = body, points = this.sheet.picture.bodies.find(([one]) => one === name)[1];
     pen.lineWidth = 5;
     for (let k = from + 1; k < to; k++) {

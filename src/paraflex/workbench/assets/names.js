@@ -1,7 +1,7 @@
 // Places of names: each beside what it names, where it covers least of the others, of symbols and of links.
 const GAPS = [7, 16, 30, 46], DIRECTIONS = [0.6, 0, -0.6, Math.PI / 2, -Math.PI / 2, Math.PI - 0.6, Math.PI, Math.PI + 0.6];
 
-// Gives each label {text, key, x, y, wide} its middle `at` and distance `gap` in pixels; `stands` keeps choices by key.
+// Gives each label {text, key, x, y, wide, clear} its middle `at` and distance `gap` in pixels; `stands` keeps choices by key.
 export function placeNames(labels, taken, stands, width, height) {
   const boxes = [], high = 7;
   for (const one of labels) {
@@ -10,7 +10,7 @@ export function placeNames(labels, taken, stands, width, height) {
     GAPS.forEach((gap, far) => DIRECTIONS.forEach((angle, k) => {
       const c = Math.cos(angle), s = Math.sin(angle);
       const edge = Math.min(Math.abs(c) > 1e-9 ? wide / Math.abs(c) : Infinity, Math.abs(s) > 1e-9 ? high / Math.abs(s) : Infinity);
-      const x = one.x + (edge + gap) * c, y = one.y - (edge + gap) * s;
+      const away = edge + Math.max(gap, (one.clear ?? 0) + 3), x = one.x + away * c, y = one.y - away * s;
       let cost = 3 * far + 0.2 * k;
       for (const [bx, by, half] of boxes) {
         cost += 40 * Math.max(0, Math.min(1, (wide + half - Math.abs(x - bx)) / wide)) * Math.max(0, Math.min(1, 2 - Math.abs(y - by) / high));

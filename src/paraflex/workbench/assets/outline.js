@@ -3,8 +3,9 @@ import { kindLabel } from "./fields.js";
 
 // Things that have no place on the sheet, and how they are added.
 const ADDABLE = [
-  ["Parameter", { kind: "set", text: "100 mm" }, "parameters", "p"], ["Section", { kind: "add-section" }], ["Material", { kind: "add-material" }], ["Lump", { kind: "add-lump-kind" }],
-  ["Gravity", { kind: "add-gravity" }], ["Mode of all motors", { kind: "add-mode" }],
+  ["Parameter", "parameters", "p", { text: "100 mm" }], ["Section", "section", "bar", { value: { width: "30 mm", thickness: "5 mm" } }],
+  ["Material", "material", "steel", { value: { youngs_modulus: "210 GPa", density: 7850 } }], ["Lump", "lump", "pin", { value: { mass: "0.1 kg", inertia: "20 kg mm^2" } }],
+  ["Gravity"], ["Mode of all motors"],
 ];
 
 // All things of the file in groups; a click selects, the cross deletes.
@@ -41,10 +42,11 @@ export class Outline {
     const made = element("select", { class: "more", "aria-label": "Add" }, element("option", { value: "" }, "Add …"));
     ADDABLE.forEach(([label], k) => made.append(element("option", { value: k }, label)));
     made.addEventListener("change", async () => {
-      const [, action, table, stem] = ADDABLE[made.value];
+      const [label, table, stem, content] = ADDABLE[made.value];
       made.value = "";
       const motors = (this.bench.state.outline ?? []).filter(({ kind }) => kind === "motor").map(({ name }) => name);
-      const found = await this.bench.act({ ...action, ...(table ? { place: [table, this.fresh(table, stem)] } : {}), ...(action.kind === "add-mode" ? { motors } : {}) });
+      const action = table ? { kind: "set", place: [table, this.fresh(table, stem)], ...content } : label === "Gravity" ? { kind: "add-gravity" } : { kind: "add-mode", motors };
+      const found = await this.bench.act(action);
       if (found?.selected) this.bench.showTab("properties");
     });
     return made;
@@ -53,7 +55,7 @@ export class Outline {
   fresh(table, stem) {
     const taken = new Set((this.bench.state.outline ?? []).filter(({ kind }) => kind === table).map(({ name }) => name));
     let k = 1;
-    while (taken.has(`${stem}${k}`)) k++;
-    return `${stem}${k}`;
+    while (taken.has(k > 1 || table === "parameters" ? `${stem}${k}` : stem)) k++;
+    return k > 1 || table === "parameters" ? `${stem}${k}` : stem;
   }
 }

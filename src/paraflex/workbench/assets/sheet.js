@@ -1,5 +1,6 @@
 import { element } from "./elements.js";
 import { alongLine, placeNames } from "./names.js";
+import { Places } from "./places.js";
 
 // The sheet: a canvas with the mechanism in metres, moved and scaled by the person, and layers that others paint over it.
 const LEAST = 1e-5, MOST = 1e4; // width of the view [m]
@@ -12,6 +13,7 @@ export class Sheet {
     this.pen = this.canvas.getContext("2d");
     this.centre = [0, 0.15];
     this.scale = 1200; // px/m
+    this.places = new Places(this);
     this.stands = new Map();
     this.behind = []; // functions (pen, sheet) that paint below the grid, below the mechanism, and above it
     this.under = [];
@@ -207,14 +209,25 @@ export class Sheet {
     const { pen } = this;
     pen.font = "600 11.5px system-ui, sans-serif"; pen.textBaseline = "middle";
     const labels = [], taken = [], written = new Set();
-    const add = (text, key, [x, y], colour) => { labels.push({ text, key, x, y, colour, wide: pen.measureText(text).width }); };
-    const atJoint = new Map();
+    const add = (text, key, [x, y], colour, clear = 0) => { labels.push({ text, key, x, y, colour, clear, wide: pen.measureText(text).width }); };
+    const atJoint = new Map(), clear = new Map(); // radius of what is painted around a place [px]
+    for (const [, look, , points] of shown.marks) {
+      if (look === "ground") taken.push(...alongLine(points.filter(Boolean).map((point) => this.px(...point))));
+      if (look !== "motor") continue;
+      const [xs, ys] = [0, 1].map((k) => points.filter(Boolean).map((point) => this.px(...point)[k]));
+      const [left, right, top, bottom] = [Math.min(...xs), Math.max(...xs), Math.min(...ys), Math.max(...ys)];
+      clear.set(`${Math.round((left + right) / 2)} ${Math.round((top + bottom) / 2)}`, (right - left) / 2);
+    }
+    for (const { kind, name } of this.bench.selected) {
+      const [, , x, y] = kind === "joint" ? shown.joints.find(([one]) => one === name) ?? [] : [];
+      if (x !== undefined) clear.set(this.px(x, y).map(Math.round).join(" "), 13);
+    }
     for (const [name, , x, y] of shown.joints) {
       const place = this.px(x, y), where = `${Math.round(place[0])} ${Math.round(place[1])}`;
       taken.push(place);
       atJoint.set(where, [...(atJoint.get(where) ?? []), name]);
     }
-    for (const [where, names] of atJoint) add(names.join(", "), `joint ${names[0]}`, where.split(" ").map(Number), this.colour("soft"));
+    for (const [where, names] of atJoint) add(names.join(", "), `joint ${names[0]}`, where.split(" ").map(Number), this.colour("soft"), clear.get(where));
     for (const [ref, x, y] of shown.points) {
       const place = this.px(x, y), where = `${Math.round(place[0])} ${Math.round(place[1])}`;
       if (!atJoint.has(where)) { add(ref.split(".").pop(), `point ${ref}`, place, this.colour("soft")); taken.push(place); }

@@ -6,6 +6,7 @@ import { Link, socketPort } from "./link.js";
 import { Motion } from "./motion.js";
 import { Outline } from "./outline.js";
 import { Photograph } from "./photograph.js";
+import { Seeing } from "./seeing.js";
 import { Sheet } from "./sheet.js";
 import { Start } from "./start.js";
 import { TextPane } from "./text.js";
@@ -42,8 +43,7 @@ class Workbench {
     this.text = new TextPane(this);
     this.photograph = new Photograph(this);
     this.start = new Start(this);
-    new Motion(this);
-    new Leave(this);
+    for (const Part of [Seeing, Motion, Leave]) new Part(this);
     this.showTab("properties");
     const page = document.body?.hasAttribute("data-workbench");
     (page ? document : root).addEventListener("keydown", (event) => this.pressed(event));
@@ -159,17 +159,20 @@ class Workbench {
   // Select what a text such as "body.link1", "ground.A" or "end_effector" names.
   selectNamed(text) {
     const [kind, ...rest] = text.split("."), name = rest.join(".");
-    const chosen = kind === "ground" ? { kind: "point", name: text } : { kind, name };
+    if (kind === "parameters") return;
+    const ofBody = (this.state.picture?.bodies ?? []).some(([body]) => body === kind) && name;
+    const chosen = kind === "ground" || ofBody ? { kind: "point", name: text } : { kind, name };
     if (this.exists(chosen.kind, chosen.name)) this.select(chosen);
   }
 
   // Place in the file, and name in messages, of something selected.
   placeOf({ kind, name }) {
-    if (kind !== "point") return name ? [kind, name] : [kind];
+    if (kind !== "point") return name && name !== kind ? [kind, name] : [kind];
     const [body, point] = name.split(".");
     return body === "ground" ? ["ground", point] : ["body", body, "points", point];
   }
   nameOf(chosen) { return chosen.kind === "point" ? chosen.name : this.placeOf(chosen).join("."); }
+  owned({ kind, name }) { return (this.state.outline ?? []).find((one) => one.kind === kind && one.name === name)?.owns ?? []; }
 
   // Go to a place in the file: select what stands there, and its field.
   goTo(place) {
@@ -254,7 +257,7 @@ class Workbench {
     const found = await this.request("goes", { names });
     if (!found) return;
     const go = () => this.act({ kind: "delete", names });
-    const more = found.goes.filter((one) => !names.includes(one)).map((one) => one.replace(/\./, " "));
+    const more = found.goes.map((one) => one.name ?? one).filter((one) => !names.includes(one)).map((one) => one.replace(/\./, " "));
     if (!more.length) go();
     else this.ask(`deletes ${listed(more)} as well`, go, "Delete");
   }
@@ -269,7 +272,7 @@ class Workbench {
   }
 
   nudge([dx, dy]) {
-    const point = this.selected.length === 1 && this.tools.pointOf(this.selected[0]);
+    const point = this.selected.length === 1 && this.sheet.places.pointOf(this.selected[0]);
     if (!point) return false;
     const [ref, x, y] = point, { step } = this.sheet;
     this.act({ kind: "move-point", ref, to: [x + dx * step, y + dy * step] });

@@ -1,0 +1,160 @@
+const TURN = Math.PI / 12; // step of directions
+const FORCE = 0.2; // N/px
+
+// The tools that add something: the points of a link or path as they are clicked, then the action.
+export class Drawing {
+  constructor(bench, tools) {
+    Object.assign(this, { bench, tools, sheet: bench.sheet, places: bench.sheet.places });
+    this.begun = []; // ends so far: {at, ref}
+  }
+
+  // A press and its release with a tool that draws: a drag has two places, a click one.
+  released(held, end, event) {
+    const { name } = this.tools.tool, dragged = held.far && !this.sameplace(held.start, end);
+    if (name === "slider") this.addSlider(held.start, dragged ? this.direction(held.start, event) : 0);
+    else if (name === "load") this.addLoad(held.start, dragged ? this.force(held.start) : [0, -10]);
+    else if (dragged && !this.begun.length && ["link", "beam", "path", "spring", "damper", "revolute", "weld", "gear", "plate"].includes(name)) {
+      this.clicked(held.start, event, true);
+      this.clicked(end, event, true);
+    } else this.clicked(end, event);
+  }
+
+  sameplace(a, b) { return Math.hypot(a.px[0] - b.px[0], a.px[1] - b.px[1]) < 4; }
+
+  sameAsLast(place) { return this.begun.length > 0 && this.sameplace({ px: this.sheet.px(...this.begun.at(-1).at) }, place); }
+
+  // A click with a tool; `drawn` if it is an end of a drag.
+  clicked(place, event, drawn = false) {
+    const { name } = this.tools.tool;
+    const click = {
+      ground: () => this.addGround(place), point: () => this.addPoint(place), lump: () => this.onPoint(place, "add-lump", "a point of a flexible link"),
+      motor: () => this.onJoint(place, "add-motor"), drive: () => this.onJoint(place, "add-drive"), effector: () => this.setEffector(place), sensor: () => this.addSensor(place),
+      gear: () => this.twoJoints(place), spring: () => this.atJointOrPoints(place, "add-spring", drawn), damper: () => this.atJointOrPoints(place, "add-damper", drawn),
+      revolute: () => this.joinPoints(place, "revolute"), weld: () => this.joinPoints(place, "weld"), slider: () => this.addSlider(place, 0), load: () => this.addLoad(place, [0, -10]),
+    }[name];
+    if (click) click();
+    else this.nextPoint(place, event.shiftKey);
+    this.tools.showHint();
+  }
+
+  // The next point of a link or path; a link has two unless more are asked for.
+  nextPoint(place, more) {
+    if (this.sameAsLast(place)) { this.finish(); return; }
+    this.begun.push({ at: place.at, ref: place.ref });
+    if (["link", "beam"].includes(this.tools.tool.name) && this.begun.length >= 2 && !more) this.finish();
+  }
+
+  finish() {
+    const { name } = this.tools.tool, points = this.begun.map(({ at, ref }) => (name === "path" ? at : ref ?? at));
+    this.begun = [];
+    this.tools.showHint();
+    this.sheet.repaint();
+    if (points.length < 2) return;
+    if (name === "path") this.bench.act({ kind: "add-path", type: points.length === 2 ? "line" : "polygon", points });
+    else if (["link", "beam", "plate"].includes(name)) this.bench.act({ kind: "add-link", points, flexible: name === "beam" });
+  }
+
+  // A point of the ground; on a point of a link it holds that.
+  async addGround(place) {
+    if (place.ref?.startsWith("ground.")) { this.bench.select({ kind: "point", name: place.ref }); return; }
+    const found = await this.bench.act({ kind: "add-ground", at: place.at });
+    if (found && place.ref) await this.bench.act({ kind: "add-joint", type: "revolute", a: found.selected, b: place.ref });
+  }
+
+  // The ref of a place: a point that is there, or a new one on the link below it.
+  async refOf(place) {
+    if (place.ref && !place.ref.startsWith("ground.")) return place.ref;
+    const other = this.places.refsAt(place.at).find((one) => !one.startsWith("ground."));
+    if (other || place.ref) return other ?? null;
+    const under = this.sheet.hitBody(...this.tools.pointer ?? place.px);
+    if (!under) return null;
+    const before = new Set(this.sheet.shown.points.map(([ref]) => ref));
+    if (!await this.bench.act({ kind: "add-point", body: under.name, at: place.at })) return null;
+    return this.bench.state.picture?.points.map(([ref]) => ref).find((ref) => !before.has(ref)) ?? null;
+  }
+
+  async addPoint(place) {
+    if (place.ref) this.bench.say("There is a point already.", "error");
+    else if (!await this.refOf(place)) this.missed("on a link");
+  }
+
+  async setEffector(place) {
+    const at = await this.refOf(place);
+    if (at) this.bench.act({ kind: "set-effector", at });
+    else this.missed("a point of a link, or the link where the point shall be");
+  }
+
+  missed(what) { if (this.bench.message.dataset.kind !== "error") this.bench.say(`Nothing there: click ${what}.`, "error"); }
+
+  onPoint(place, kind, what) {
+    const ref = this.places.refsAt(place.at).find((one) => !one.startsWith("ground."));
+    if (ref) this.bench.act({ kind, at: ref });
+    else this.missed(what);
+  }
+
+  onJoint(place, kind) {
+    const [joint] = this.places.jointsAt(place.at);
+    if (joint) this.bench.act({ kind, joint });
+    else this.missed("a joint");
+  }
+
+  twoJoints(place) {
+    const [joint] = this.places.jointsAt(place.at);
+    if (!joint) { this.missed("a joint"); return; }
+    this.begun.push({ at: place.at, ref: place.ref, joint });
+    if (this.begun.length < 2) return;
+    const joints = this.begun.splice(0).map((one) => one.joint);
+    this.bench.act({ kind: "add-gear", joints, ratio: -1 });
+  }
+
+  atJointOrPoints(place, kind, drawn) {
+    const [joint] = this.places.jointsAt(place.at);
+    if (joint && !this.begun.length && !drawn) { this.bench.act({ kind, joint }); return; }
+    if (!place.ref) { this.missed("a joint or a point"); return; }
+    this.begun.push({ at: place.at, ref: place.ref });
+    if (this.begun.length === 2) this.bench.act({ kind, points: this.begun.splice(0).map((one) => one.ref) });
+  }
+
+  joinPoints(place, type) {
+    if (!place.ref) { this.missed("a point of a link or of the ground"); return; }
+    const refs = this.places.refsAt(place.at), bodies = new Set(refs.map((one) => one.split(".")[0]));
+    if (!this.begun.length && bodies.size > 1 && this.places.jointsAt(place.at).length < bodies.size - 1) {
+      this.bench.act({ kind: "add-joint", type, a: refs[0], b: refs.at(-1) });
+      return;
+    }
+    this.begun.push({ at: place.at, ref: place.ref });
+    if (this.begun.length < 2) return;
+    const [a, b] = this.begun.splice(0).map((one) => one.ref);
+    this.bench.act({ kind: "add-joint", type, a, b });
+  }
+
+  addSlider(place, direction) {
+    const ref = this.places.refsAt(place.at).find((one) => !one.startsWith("ground.")) ?? place.ref;
+    this.bench.act({ kind: "add-slider", at: ref ?? place.at, direction });
+  }
+
+  direction(start, event) {
+    const [px, py] = this.tools.pointer, angle = Math.atan2(start.px[1] - py, px - start.px[0]);
+    return event.altKey ? angle : Math.round(angle / TURN) * TURN;
+  }
+
+  force(start) {
+    const [px, py] = this.tools.pointer;
+    return [Math.round((px - start.px[0]) * FORCE), Math.round((start.px[1] - py) * FORCE)];
+  }
+
+  async addLoad(place, force) {
+    const at = await this.refOf(place);
+    if (at) this.bench.act({ kind: "add-load", at, force });
+    else this.missed("a point of a link");
+  }
+
+  addSensor(place) {
+    const [joint] = this.places.jointsAt(place.at), ref = this.places.refsAt(place.at).find((one) => !one.startsWith("ground."));
+    const under = this.sheet.hitBody(...this.tools.pointer ?? place.px);
+    if (joint) this.bench.act({ kind: "add-sensor", joint });
+    else if (ref) this.bench.act({ kind: "add-sensor", at: ref });
+    else if (under) this.bench.act({ kind: "add-sensor", body: under.name });
+    else this.missed("a joint, a point or a link");
+  }
+}
