@@ -23,6 +23,9 @@ export function shortNumber(value, digits = 4) {
   return String(+value.toPrecision(digits)).replace("-", "−");
 }
 
+// Name of a mode with a true minus.
+export function modeText(name) { return /^[+-]+$/.test(name) ? name.replaceAll("-", "−") : name; }
+
 // Round numbers within a range, about as many as asked for.
 export function roundTicks(low, high, count) {
   const rough = (high - low) / Math.max(count, 1), power = 10 ** Math.floor(Math.log10(rough));
@@ -302,7 +305,7 @@ export class Chart {
   showValues() {
     const seen = new Set();
     for (const one of this.curves) {
-      const output = one.ghost || one.weak || one.curve.mark || seen.has(one.curve.name) ? null : this.values.get(one.curve.name), place = output && this.place(one);
+      const output = one.ghost || one.curve.mark || seen.has(one.curve.name) ? null : this.values.get(one.curve.name), place = output && this.place(one);
       if (!place) continue;
       seen.add(one.curve.name);
       const text = shortNumber(sampleAt(one.y, place));

@@ -1,5 +1,6 @@
-import { Chart, readPage, shortNumber } from "./curves.js";
+import { Chart, modeText, shortNumber } from "./curves.js";
 import { button, element, quantity } from "./elements.js";
+import { Pulling, linearCharts } from "./pulling.js";
 import { Recording } from "./recordings.js";
 
 // The dock below the sheet: a turn of the crank, other assemblies, the flexible run, and one slider of time for all.
@@ -36,16 +37,17 @@ export class Motion {
     this.clock = element("output", { class: "clock" });
     this.pace = element("select", { "aria-label": "Speed", title: "Speed", onchange: () => { this.speed = Number(this.pace.value); } }, ...PLAY_SPEEDS.map((one) => element("option", { value: one }, `${one} ×`)));
     const loop = button("⟲", "Again and again", () => { this.looping = !this.looping; loop.setAttribute("aria-pressed", this.looping); }, { class: "icon", "aria-pressed": "true" });
-    this.player = element("div", { class: "player", hidden: true }, this.go, button("‹", "One frame back (←)", () => this.step(-1), { class: "icon" }), button("›", "One frame on (→)", () => this.step(1), { class: "icon" }), this.slider, this.clock, this.pace, loop);
+    this.opener = button("Charts ▴", "Charts and tables of the motion", () => this.open(this.drawer.hidden), { "aria-expanded": "false" });
+    this.player = element("div", { class: "player", hidden: true }, this.go, button("‹", "One frame back (←)", () => this.step(-1), { class: "icon" }), button("›", "One frame on (→)", () => this.step(1), { class: "icon" }), this.slider, this.clock, this.pace, loop, this.opener);
     this.auto = element("input", { type: "checkbox", checked: true });
     this.turner = button("↻ Turn the crank", "Turn the crank: a full turn with positions, velocities, accelerations and coupler curves", () => this.turn());
     this.runner = button("▶ Run", "Compute the flexible motion in all modes of the study", () => this.run(true), { class: "main" });
     this.bar = element("div", { class: "progress", role: "progressbar", "aria-label": "Progress of the run", hidden: true }, element("i", {}));
     this.chips = element("div", { class: "chips", role: "radiogroup", "aria-label": "Motion that is shown" });
-    this.opener = button("Charts ▴", "Charts and tables of the motion", () => this.open(this.drawer.hidden), { "aria-expanded": "false", hidden: true });
+    this.results = element("span", { class: "results" });
     const actions = element("div", { class: "actions" }, this.turner, button("Assemblies", "All ways in which the links can be joined at this place", () => this.showAssemblies()),
-      button("Linear", "Poles and frequency responses about this pose", () => this.showLinear()), this.runner,
-      element("label", { class: "auto", title: "Run after each change" }, this.auto, "auto"), this.bar, this.chips, element("span", { class: "gap" }), this.opener);
+      button("Linear", "Poles and frequency responses about this pose", () => this.showLinear()), new Pulling(this.bench).opener, this.runner,
+      element("label", { class: "auto", title: "Run after each change" }, this.auto, "auto"), this.bar, this.results);
     this.tools = this.makeTools();
     this.news = element("p", { class: "news" });
     this.drawer = this.makeDrawer();
@@ -60,8 +62,8 @@ export class Motion {
     this.ghosted = element("input", { type: "checkbox", checked: true, onchange: () => { this.fill(); this.sheet.repaint(); } });
     this.hasGhost = element("label", { hidden: true }, this.ghosted, "run before");
     this.hasStress = element("label", {}, this.stressed, "stress");
-    this.results = element("span", { class: "results" });
-    return element("div", { class: "showing", hidden: true }, element("label", {}, "deflections ×", this.magnifier, this.magnified), this.hasStress, this.hasGhost, this.results);
+    this.hasMagnify = element("label", {}, "deflections ×", this.magnifier, this.magnified);
+    return element("div", { class: "showing", hidden: true }, this.chips, this.hasMagnify, this.hasStress, this.hasGhost);
   }
 
   makeDrawer() {
@@ -154,10 +156,9 @@ export class Motion {
 
   clockText() {
     const { page } = this.recording, over = this.kind === "turn" ? page.abscissae[0] : null;
-    const time = `t = ${this.time.toFixed(this.recording.end < 20 ? 3 : 2)} s`;
-    if (!over) return time;
+    if (!over) return `t = ${this.time.toFixed(this.recording.end < 20 ? 3 : 2)} s`;
     const [before, share] = between(page.rows[page.time], this.time), row = page.rows[over.rows[0]], value = row[before] + share * ((row[before + 1] ?? row[before]) - row[before]);
-    return `${over.name} = ${over.label.endsWith("[rad]") ? `${(value * 180 / Math.PI).toFixed(1)}°` : quantity(value, "m")}   ${time}`;
+    return `${over.name} = ${over.label.endsWith("[rad]") ? `${(value * 180 / Math.PI).toFixed(1)}°` : quantity(value, "m")}`;
   }
 
   // Motions.
@@ -176,10 +177,11 @@ export class Motion {
     const wished = recording.runs.indexOf(this.bench.state.mode ?? "");
     this.index = run >= 0 && run < recording.runs.length ? run : wished >= 0 ? wished : recording.page.selected ?? 0;
     if (fresh) this.begin(recording, before);
-    this.player.hidden = this.opener.hidden = false;
+    this.player.hidden = false;
     this.fillChips();
     this.fill();
     this.showResults();
+    if (fresh && this.film && this.sheet.fitting && play) { this.show(); this.sheet.fit(); }
     if (play) { if (!this.playing) this.play(); } else if (this.sheet.picture || !fresh) this.show();
   }
 
@@ -216,10 +218,10 @@ export class Motion {
     if (run) run.runs.forEach((name, k) => { if (turn || run.runs.length > 1) chips.push(["run", k, name || "run"]); });
     this.chips.replaceChildren(...chips.map(([kind, k, name]) => {
       const error = kind === "run" && run.found.errors?.find((one) => one.mode === run.runs[k]);
-      return element("button", { type: "button", role: "radio", "aria-checked": String(this.kind === kind && this.index === k), title: error?.text ?? `Show ${name}`, "data-failed": String(!!error), onclick: () => this.choose(kind, k, this.playing) }, name);
+      return element("button", { type: "button", role: "radio", "aria-checked": String(this.kind === kind && this.index === k), title: error?.text ?? `Show ${name}`, "data-failed": String(!!error), onclick: () => this.choose(kind, k, this.playing) }, modeText(name));
     }));
-    const moving = this.kind === "run" ? this.film : null;
-    this.tools.hidden = !moving;
+    this.tools.hidden = !chips.length && this.kind === "turn";
+    this.hasMagnify.hidden = !this.film?.bends;
     this.hasStress.hidden = !this.recording.stress;
     this.hasGhost.hidden = !this.before;
   }
@@ -293,7 +295,7 @@ export class Motion {
     if (this.recordings.turn?.revision === this.bench.state.revision && this.kind !== "turn") { this.choose("turn"); return; }
     const { revision } = this.bench.state, joint = this.bench.selected.find(({ kind }) => kind === "joint")?.name;
     this.turner.disabled = true;
-    const found = await this.bench.request("turn", joint ? { drive: joint } : {});
+    const found = await this.ask("turn", joint ? { drive: joint } : {});
     this.turner.disabled = false;
     if (!found) return;
     this.take(await Recording.ofTurn(found, revision));
@@ -305,7 +307,7 @@ export class Motion {
   async run(asked = true) {
     this.asked = asked;
     this.progress("begins", 0);
-    const found = await (asked ? this.bench.request("run") : this.bench.link.ask("run").catch(() => null));
+    const found = await (asked ? this.ask("run") : this.bench.link.ask("run").catch(() => null));
     if (!found) this.bar.hidden = true;
     else this.number = Math.max(this.number, found.run ?? 0);
   }
@@ -340,7 +342,7 @@ export class Motion {
 
   // Assemblies as small pictures; a click takes one.
   async showAssemblies() {
-    const found = await this.bench.request("assemblies");
+    const found = await this.ask("assemblies");
     if (!found) return;
     const cards = element("div", { class: "cards" }), dialog = this.bench.dialog("Assemblies", element("p", { class: "soft" }, found.assemblies.length === 1 ? "There is only this way to join the links here." : `${found.assemblies.length} ways to join the links here; the file keeps one with “Keep this pose”.`), cards);
     dialog.classList.add("wide");
@@ -352,7 +354,7 @@ export class Motion {
   }
 
   async takeAssembly(number) {
-    const found = await this.bench.request("assembly", { number });
+    const found = await this.ask("assembly", { number });
     if (!found) return;
     this.stop();
     this.bench.tools.dragging.posed.hidden = false;
@@ -360,13 +362,16 @@ export class Motion {
   }
 
   async showLinear() {
-    const found = await this.bench.request("linear");
-    if (!found?.page) return;
-    const page = await readPage(found.page), holder = element("div", { class: "plots" });
-    const clock = { time: 0, index: page.selected ?? 0, over: 0, seek() {} };
-    const charts = page.panels.flatMap((panel) => panel.charts).map((description) => new Chart(this.bench, clock, description, page));
-    holder.append(...charts.map((chart) => chart.figure), ...(found.tables ?? []).map(tableOf));
-    this.bench.dialog("Linear model about this pose", holder).classList.add("wide");
+    const found = await this.ask("linear");
+    if (!found?.poles) return;
+    const { charts, table } = linearCharts(this.bench, found), holder = element("div", { class: "plots" }, ...charts.map((chart) => chart.figure), tableOf(table));
+    this.bench.dialog(`Linear model about this pose${found.mode ? `, mode ${modeText(found.mode)}` : ""}`, holder).classList.add("wide");
+  }
+
+  // A request whose reply is shown here and not in the message line, but for its refusal.
+  async ask(what, fields = {}) {
+    this.bench.say("");
+    try { return await this.bench.link.ask(what, fields); } catch (error) { this.bench.say(error.text ?? String(error), "error"); return null; }
   }
 
   // What is painted on the sheet.

@@ -1,4 +1,4 @@
-import { shortNumber } from "./curves.js";
+import { modeText, shortNumber } from "./curves.js";
 import { element, quantity } from "./elements.js";
 
 // Numbers of the pose at the side, and on the sheet the compliance ellipse, the path by reach, and trails of a drag.
@@ -59,7 +59,7 @@ export class Seeing {
 
   // Distances from singular positions, as bars that are full far away from them.
   bars(seen) {
-    const bars = [["reach", seen.serial, "of the end-effector (serial, type I)"], ["motors", seen.parallel, "of these motors (parallel, type II)"]].filter(([, value]) => value !== null && value !== undefined);
+    const bars = [["reach (serial)", seen.serial, "of the end-effector (serial, type I)"], ["motors (parallel)", seen.parallel, "of these motors (parallel, type II)"]].filter(([, value]) => value !== null && value !== undefined);
     this.put("singular", "From singular", bars.length ? "." : "", "");
     const { value } = this.rows.get("singular");
     value.replaceChildren(...bars.map(([word, share, help]) => {
@@ -77,7 +77,7 @@ export class Seeing {
     const focused = this.chips.contains(document.activeElement) ? document.activeElement.textContent : null;
     this.chips.replaceChildren(...chips.map(({ name, motors, lacks, drives }) => {
       const text = lacks || `drives all ${drives} degree${drives === 1 ? "" : "s"} of freedom`;
-      return element("button", { type: "button", role: "radio", "aria-checked": String(name === mode), title: `Motors ${motors.join(", ")}: ${text}`, "data-lacks": String(!!lacks), onclick: () => this.choose(name) }, element("b", {}, name), element("small", {}, lacks || motors.join(" ")));
+      return element("button", { type: "button", role: "radio", "aria-checked": String(name === mode), title: `Motors ${motors.join(", ")}: ${text}`, "data-lacks": String(!!lacks), onclick: () => this.choose(name) }, element("b", {}, modeText(name)), element("small", {}, lacks || motors.join(" ")));
     }));
     [...this.chips.children].find((one) => one.textContent === focused)?.focus();
   }

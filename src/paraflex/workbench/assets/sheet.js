@@ -54,10 +54,10 @@ export class Sheet {
 
   // Show all of the mechanism.
   fit() {
-    const shown = this.bench.state.picture;
+    const { shown } = this, limits = shown?.limits ?? [-0.25, -0.1, 0.25, 0.3], path = (shown?.path ?? []).filter(Boolean);
     this.fitting = true;
     if (!this.width) return;
-    this.show(shown?.limits ?? [-0.25, -0.1, 0.25, 0.3], true);
+    this.show(limits.map((one, k) => (k < 2 ? Math.min : Math.max)(one, ...path.map((place) => place[k % 2]))), true);
   }
 
   // Show a part of the plane.
