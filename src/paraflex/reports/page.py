@@ -46,7 +46,7 @@ from .text import pairs
 _FOLDED = 3
 _ORIGIN = "How these results were made"
 _STYLES = ("page.css",)
-_SCRIPTS = ("report.js", "designs.js", "charts.js", "player.js", "start.js")
+_SCRIPTS = ("unpacking.js", "report.js", "designs.js", "charts.js", "player.js", "start.js")
 
 
 @named_in_errors("a page", "what tracking_page or motion_page returns")

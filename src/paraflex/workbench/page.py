@@ -10,8 +10,11 @@ from paraflex.plots.themes import THEMES
 # Modules in the order in which they are joined; each imports only from those before it.
 _MODULES = (
     "elements.js", "colours.js", "link.js", "names.js", "places.js", "sheet.js", "icons.js", "dragging.js", "drawing.js", "painting.js",
-    "tools.js", "fields.js", "outline.js", "text.js", "photograph.js", "start.js", "workbench.js",
+    "tools.js", "fields.js", "outline.js", "text.js", "photograph.js", "start.js", "curves.js", "recordings.js", "pulling.js", "motion.js", "seeing.js", "leave.js",
+    "workbench.js",
 )  # fmt: skip
+# Scripts of reports that stand before the modules, and the style sheets.
+_SHARED, _STYLES = ("unpacking.js",), ("workbench.css", "panels.css")
 _IMPORT = re.compile(r"^import .*?;\n", re.MULTILINE | re.DOTALL)
 _EXPORT = re.compile(r"^export (?!default)", re.MULTILINE)
 
@@ -20,14 +23,16 @@ _EXPORT = re.compile(r"^export (?!default)", re.MULTILINE)
 def module() -> str:
     """Return the ES module of the page, whose default export has `render({model, el})` as anywidget asks for."""
     parts = [_IMPORT.sub("", _EXPORT.sub("", _asset(name))) for name in _MODULES]
-    return "".join(f"// {name}\n{part}\n" for name, part in zip(_MODULES, parts, strict=True))
+    shared = [_asset(name, "reports") for name in _SHARED]
+    names = (*_SHARED, *_MODULES)
+    return "".join(f"// {name}\n{part}\n" for name, part in zip(names, [*shared, *parts], strict=True))
 
 
 @cache
 def style() -> str:
     """Return the style sheet, with the colours of drawings and reports."""
     light, dark = (_colours(name) for name in ("light", "dark"))
-    return Template(_asset("workbench.css")).safe_substitute(light=light, dark=dark)
+    return Template("".join(map(_asset, _STYLES))).safe_substitute(light=light, dark=dark)
 
 
 @cache
@@ -44,5 +49,5 @@ def _colours(name: str) -> str:
     return " ".join(f"--{key}: {colour};" for key, colour in named.items())
 
 
-def _asset(name: str) -> str:
-    return (files("paraflex.workbench") / "assets" / name).read_text(encoding="utf-8")
+def _asset(name: str, package: str = "workbench") -> str:
+    return (files(f"paraflex.{package}") / "assets" / name).read_text(encoding="utf-8")

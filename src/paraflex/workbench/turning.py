@@ -18,6 +18,7 @@ from paraflex.figures.shapes import figure_of
 from paraflex.files import Model
 from paraflex.mechanism.masses import check_masses
 from paraflex.plots.scene import is_plate
+from paraflex.reports.film import animation, frames_of
 from paraflex.results import motion_dataset
 from paraflex.results.drawing import system_drawing
 from paraflex.results.outlines import outlines
@@ -43,7 +44,7 @@ def turning(model: Model, *, assembly: str | None = None, **wishes: Any) -> dict
     -------
     dict
         Numbers in SI units and radians, None where there is none: what drives the mechanism (`drive`, `path`, `mode`,
-        `freedoms`, `over`), `time`, `frames`, `curves`, `trails`, and the features as `paraflex kinematics` has them
+        `freedoms`, `over`), `time`, `frames`, `film` as a report has it, `curves`, `trails`, and the features as `paraflex kinematics` has them
         (`features`, `tiles`, `tables`, `note`), `findings`, and why there are no forces (`loads_problem`).
 
     Raises
@@ -63,6 +64,7 @@ def turning(model: Model, *, assembly: str | None = None, **wishes: Any) -> dict
         "over": _over(data, found),
         "time": _plain(data["time"].values),
         "frames": _frames(motion),
+        "film": _film(data),
         "curves": [*_points_curves(data, shown), *_bodies_curves(data), *_joint_curves(data, found),
                    *_transmission_curves(motion), *_effort_curves(data)],
         "trails": [_trail(data, found, name) for name in shown],
@@ -108,6 +110,12 @@ def _over(data: xr.Dataset, found: dict[str, Any]) -> dict[str, Any]:
         return {"joint": "", "unit": "s", "values": _plain(data["time"].values)}
     values = data["joint_coordinate"].sel(joint=joint).values
     return {"joint": joint, "unit": found["joint_units"][joint], "values": _plain(values)}
+
+
+def _film(data: xr.Dataset) -> dict[str, Any] | None:
+    """Return the motion with the symbols of joints, as the page plays runs."""
+    film = animation(data.isel(time=frames_of(data.sizes["time"], _FRAMES)).transpose("time", ...), ())
+    return None if film is None else film.to_dict()
 
 
 def _frames(motion: DrivenMotion) -> dict[str, Any]:

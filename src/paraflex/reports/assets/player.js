@@ -74,24 +74,6 @@ const player = (() => {
   const px = (x) => place.x + place.scale * x;
   const py = (y) => place.y - place.scale * y;
 
-  // Values of an array (runs, frames, wide) at a time: between frames, as motion is; what stands still has one frame.
-  function at(array, run, before, share) {
-    if (array.frames === 1) before = share = 0;
-    const start = (run * array.frames + before) * array.wide;
-    const out = array.values.slice(start, start + array.wide);
-    if (share > 0) for (let k = 0; k < out.length; k++) out[k] += share * (array.values[start + array.wide + k] - out[k]);
-    return out;
-  }
-
-  // The last frame a run got to.
-  function reached(array, run) {
-    for (let frame = array.frames - 1; frame >= 0; frame--) {
-      const start = (run * array.frames + frame) * array.wide;
-      for (let k = 0; k < array.wide; k++) if (Number.isFinite(array.values[start + k])) return frame;
-    }
-    return -1;
-  }
-
   function trace(points, from, to) {
     pen.beginPath();
     let begun = false;
@@ -256,15 +238,15 @@ const player = (() => {
     if (canvas.clientWidth !== width || canvas.clientHeight !== height || canvas.width !== Math.round(width * (devicePixelRatio || 1))) fit();
     pen.clearRect(0, 0, width, height);
     let [before, share] = report.between(times, state.time);
-    const farthest = reached(arrays.base, state.run);
+    const farthest = lastFrame(arrays.base, state.run);
     const stopped = farthest < times.length - 1 && (farthest < 0 || state.time > times[farthest]);
     if (stopped) [before, share] = [Math.max(farthest, 0), 0];
     else if (before >= farthest) share = before + 1 > farthest ? 0 : share;
     drawPath();
     if (farthest >= 0) {
-      const base = at(arrays.base, state.run, before, share), bend = at(arrays.bend, state.run, before, share);
-      const [still, moving] = film.marks[state.run], [ground, points] = arrays.marks[state.run].map((one) => at(one, 0, before, share));
-      const swing = arrays.swing[state.run] && at(arrays.swing[state.run], 0, before, share);
+      const base = valuesAt(arrays.base, state.run, before, share), bend = valuesAt(arrays.bend, state.run, before, share);
+      const [still, moving] = film.marks[state.run], [ground, points] = arrays.marks[state.run].map((one) => valuesAt(one, 0, before, share));
+      const swing = arrays.swing[state.run] && valuesAt(arrays.swing[state.run], 0, before, share);
       if (swing) for (let k = 0; k < points.length; k++) points[k] += (state.magnify - 1) * swing[k];
       const drawn = base.map((value, k) => value + state.magnify * bend[k]), tips = film.tips[state.run] || [];
       pen.lineCap = pen.lineJoin = "round";

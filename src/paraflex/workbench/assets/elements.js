@@ -14,7 +14,7 @@ export const button = (text, title, onclick, attributes = {}) => element("button
 
 // Prefixes of SI units from the smallest to the largest, and the units that take them.
 const PREFIXES = [[1e-9, "n"], [1e-6, "µ"], [1e-3, "m"], [1, ""], [1e3, "k"], [1e6, "M"], [1e9, "G"]];
-const PREFIXED = ["m", "N", "N m", "Pa", "Hz", "s", "J", "W", "m/N", "rad/s"];
+const PREFIXED = ["m", "N", "N m", "Pa", "Hz", "s", "J", "W", "m/N", "N/m", "rad/s"];
 
 // A number in few digits with its unit: 0.0123 m is "12.3 mm"; an empty text for one that is not known.
 export function quantity(value, unit = "", digits = 3) {

@@ -54,10 +54,10 @@ export class Sheet {
 
   // Show all of the mechanism.
   fit() {
-    const shown = this.bench.state.picture;
+    const { shown } = this, limits = shown?.limits ?? [-0.25, -0.1, 0.25, 0.3], path = (shown?.path ?? []).filter(Boolean);
     this.fitting = true;
     if (!this.width) return;
-    this.show(shown?.limits ?? [-0.25, -0.1, 0.25, 0.3], true);
+    this.show(limits.map((one, k) => (k < 2 ? Math.min : Math.max)(one, ...path.map((place) => place[k % 2]))), true);
   }
 
   // Show a part of the plane.
@@ -162,6 +162,7 @@ export class Sheet {
       this.trace(points);
       if (plate) { pen.globalAlpha = 0.22; pen.fill(); pen.globalAlpha = 1; }
       pen.lineWidth = 4; pen.stroke();
+      this.overBody?.(name);
     });
     this.paintMarks(shown.marks.filter(([when]) => when !== "still"), looks);
     this.paintPoints(shown);

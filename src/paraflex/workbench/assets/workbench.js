@@ -1,9 +1,12 @@
 import { Colours } from "./colours.js";
 import { button, element } from "./elements.js";
 import { Fields } from "./fields.js";
+import { Leave } from "./leave.js";
 import { Link, socketPort } from "./link.js";
+import { Motion } from "./motion.js";
 import { Outline } from "./outline.js";
 import { Photograph } from "./photograph.js";
+import { Seeing } from "./seeing.js";
 import { Sheet } from "./sheet.js";
 import { Start } from "./start.js";
 import { TextPane } from "./text.js";
@@ -40,6 +43,7 @@ class Workbench {
     this.text = new TextPane(this);
     this.photograph = new Photograph(this);
     this.start = new Start(this);
+    for (const Part of [Seeing, Motion, Leave]) new Part(this);
     this.showTab("properties");
     const page = document.body?.hasAttribute("data-workbench");
     (page ? document : root).addEventListener("keydown", (event) => this.pressed(event));
