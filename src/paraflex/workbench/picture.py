@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 
 from paraflex.arrays import Array, Numbers
+from paraflex.errors import ParaflexError
 from paraflex.mechanism import GROUND, Body, LumpedMass, Mechanism, PointRef
 from paraflex.mechanism.poses import Pose, local_points
 from paraflex.plots.marks import LOOKS, moving_marks, still_marks, support

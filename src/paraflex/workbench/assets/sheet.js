@@ -218,7 +218,7 @@ export class Sheet {
       clear.set(`${Math.round((left + right) / 2)} ${Math.round((top + bottom) / 2)}`, (right - left) / 2);
     }
     for (const { kind, name } of this.bench.selected) {
-      const [, , x, y] = kind === "joint" ? shown.joints.find(([one]) => one === name) ?? [] : [];
+      const [x, y] = ((kind === "joint" ? shown.joints : shown.points).find(([one]) => one === name) ?? []).slice(kind === "joint" ? 2 : 1);
       if (x !== undefined) clear.set(this.px(x, y).map(Math.round).join(" "), 13);
     }
     for (const [name, , x, y] of shown.joints) {
@@ -229,7 +229,7 @@ export class Sheet {
     for (const [where, names] of atJoint) add(names.join(", "), `joint ${names[0]}`, where.split(" ").map(Number), this.colour("soft"), clear.get(where));
     for (const [ref, x, y] of shown.points) {
       const place = this.px(x, y), where = `${Math.round(place[0])} ${Math.round(place[1])}`;
-      if (!atJoint.has(where)) { add(ref.split(".").pop(), `point ${ref}`, place, this.colour("soft")); taken.push(place); }
+      if (!atJoint.has(where)) { add(ref.split(".").pop(), `point ${ref}`, place, this.colour("soft"), clear.get(where)); taken.push(place); }
     }
     for (const [, look, name, points] of shown.marks) if (name && ["load", "spring", "sensor"].includes(look) && !written.has(name)) { written.add(name); add(name, `${look} ${name}`, this.px(...points[0]), this.colour(look === "load" ? "trail" : "soft")); }
     shown.bodies.forEach(([name, points], k) => {
