@@ -1,4 +1,4 @@
-"""Actions of the workbench: minimal edits of model files, of every library mechanism and of sheets drawn from nothing."""
+"""Actions of the workbench: minimal edits of model files, and mechanisms drawn from an empty sheet."""
 
 import json
 import math
@@ -67,9 +67,10 @@ def check_minimal(old, new):
     ]
     assert len(gone) <= 4 * len(gone_tables)
     # Of a line that has changed, the part outside of the changed values stays.
-    changed = [entry for entry in entries_of(old) if entry.kind == "pair" and entry.place in places_of(new)]
-    for entry in changed:
-        assert line_frame(old, entry) == line_frame(new, places_of(new)[entry.place])
+    found = places_of(new)
+    for place, entry in places_of(old).items():
+        if place in found:
+            assert line_frame(old, entry) == line_frame(new, found[place])
 
 
 def places_of(text):
@@ -107,42 +108,85 @@ class Hand:
         )
         places = [place for place, _ in leaves(data)]
         tables = [table for table, each in data.items() if isinstance(each, dict)]
-        return choose([
-            lambda: {"kind": "add-ground", "at": [0.1, 0.2]},
-            lambda: {"kind": "add-link", "points": [self.at(data) for _ in range(choose([2, 2, 3]))],
-                     "flexible": choose([True, False])},
-            lambda: {"kind": "add-joint", "type": choose(["revolute", "weld", "slot", "prismatic", "distance", "sliding"]),
-                     "a": self.ref(data), "b": self.ref(data)},
-            lambda: {"kind": "add-slider", "at": self.at(data), "direction": 0.3, "block": choose([True, False])},
-            lambda: {"kind": "add-motor", "joint": joint},
-            lambda: {"kind": "add-drive", "joint": joint, "speed": 3.0},
-            lambda: {"kind": "add-spring", "joint": joint, "stiffness": 2.0},
-            lambda: {"kind": "add-spring", "points": [self.ref(data), self.ref(data)]},
-            lambda: {"kind": "add-damper", "joint": joint},
-            lambda: {"kind": "add-gear", "joints": [joint, self.name(data, "joint")[1]], "ratio": -2},
-            lambda: {"kind": "add-load", "at": self.ref(data), choose(["force", "torque"]): choose([[1.0, 2.0], 3.0])},
-            lambda: {"kind": "add-lump", "at": self.ref(data)},
-            lambda: {"kind": "add-sensor", choose(["at", "joint", "body"]): choose([joint, self.ref(data), *data["body"]])},
-            lambda: {"kind": "add-point", "body": self.name(data, "body")[1], "at": [0.1, 0.1]},
-            lambda: {"kind": "set-effector", "at": self.ref(data)},
-            lambda: {"kind": "add-path", "type": choose(["line", "polygon", "points"]),
-                     "points": [[0.1, 0.2], [0.15, 0.2], [0.1, 0.25]][: choose([2, 3])]},
-            lambda: {"kind": "add-mode", "motors": list(data.get("motor", {}))[:1]},
-            lambda: {"kind": "add-gravity"},
-            lambda: {"kind": "move-point", "ref": self.ref(data), "to": [round(self.random.uniform(-0.3, 0.3), 3), 0.1]},
-            lambda: {"kind": "move-point", "ref": self.ref(data), "to": [0.2, round(self.random.uniform(-0.3, 0.3), 3)]},
-            lambda: {"kind": "set", "place": list(choose(places)), "text": number},
-            lambda: {"kind": "set", "place": [*choose(places)[:2], choose(["mass", "flexible", "elements", "x"])], "text": number},
-            lambda: {"kind": "unset", "place": list(choose(places))},
-            lambda: {"kind": "rename", "name": ".".join(self.name(data, *tables)), "to": choose(["new", "a b", "x1", "m"])},
-            lambda: {"kind": "rename", "name": self.ref(data), "to": choose(["new", "Z9", "A"])},
-            lambda: {"kind": "delete", "names": [".".join(self.name(data, *tables))]},
-            lambda: {"kind": "delete", "names": [self.ref(data)]},
-            lambda: {"kind": "delete", "names": [f"body.{name}" for name in data.get("body", {})]},
-            lambda: {"kind": "copy", "names": [f"body.{name}" for name in list(data["body"])[:2]], "by": [0.1, 0.0]},
-            lambda: {"kind": "mirror", "names": [f"body.{name}" for name in list(data["body"])[:2]], "axis": choose("xy")},
-            lambda: {"kind": "pose", "angles": dict.fromkeys(data["body"], 0.5)},
-        ])()  # fmt: skip
+        return choose(
+            [
+                lambda: {"kind": "add-ground", "at": [0.1, 0.2]},
+                lambda: {
+                    "kind": "add-link",
+                    "points": [self.at(data) for _ in range(choose([2, 2, 3]))],
+                    "flexible": choose([True, False]),
+                },
+                lambda: {
+                    "kind": "add-joint",
+                    "type": choose(["revolute", "weld", "slot", "prismatic", "distance", "sliding"]),
+                    "a": self.ref(data),
+                    "b": self.ref(data),
+                },
+                lambda: {"kind": "add-slider", "at": self.at(data), "direction": 0.3, "block": choose([True, False])},
+                lambda: {"kind": "add-motor", "joint": joint},
+                lambda: {"kind": "add-drive", "joint": joint, "speed": 3.0},
+                lambda: {"kind": "add-spring", "joint": joint, "stiffness": 2.0},
+                lambda: {"kind": "add-spring", "points": [self.ref(data), self.ref(data)]},
+                lambda: {"kind": "add-damper", "joint": joint},
+                lambda: {"kind": "add-gear", "joints": [joint, self.name(data, "joint")[1]], "ratio": -2},
+                lambda: {
+                    "kind": "add-load",
+                    "at": self.ref(data),
+                    choose(["force", "torque"]): choose([[1.0, 2.0], 3.0]),
+                },
+                lambda: {"kind": "add-lump", "at": self.ref(data)},
+                lambda: {
+                    "kind": "add-sensor",
+                    choose(["at", "joint", "body"]): choose([joint, self.ref(data), *data["body"]]),
+                },
+                lambda: {"kind": "add-point", "body": self.name(data, "body")[1], "at": [0.1, 0.1]},
+                lambda: {"kind": "set-effector", "at": self.ref(data)},
+                lambda: {
+                    "kind": "add-path",
+                    "type": choose(["line", "polygon", "points"]),
+                    "points": [[0.1, 0.2], [0.15, 0.2], [0.1, 0.25]][: choose([2, 3])],
+                },
+                lambda: {"kind": "add-mode", "motors": list(data.get("motor", {}))[:1]},
+                lambda: {"kind": "add-gravity"},
+                lambda: {
+                    "kind": "move-point",
+                    "ref": self.ref(data),
+                    "to": [round(self.random.uniform(-0.3, 0.3), 3), 0.1],
+                },
+                lambda: {
+                    "kind": "move-point",
+                    "ref": self.ref(data),
+                    "to": [0.2, round(self.random.uniform(-0.3, 0.3), 3)],
+                },
+                lambda: {"kind": "set", "place": list(choose(places)), "text": number},
+                lambda: {
+                    "kind": "set",
+                    "place": [*choose(places)[:2], choose(["mass", "flexible", "elements", "x"])],
+                    "text": number,
+                },
+                lambda: {"kind": "unset", "place": list(choose(places))},
+                lambda: {
+                    "kind": "rename",
+                    "name": ".".join(self.name(data, *tables)),
+                    "to": choose(["new", "a b", "x1", "m"]),
+                },
+                lambda: {"kind": "rename", "name": self.ref(data), "to": choose(["new", "Z9", "A"])},
+                lambda: {"kind": "delete", "names": [".".join(self.name(data, *tables))]},
+                lambda: {"kind": "delete", "names": [self.ref(data)]},
+                lambda: {"kind": "delete", "names": [f"body.{name}" for name in data.get("body", {})]},
+                lambda: {
+                    "kind": "copy",
+                    "names": [f"body.{name}" for name in list(data["body"])[:2]],
+                    "by": [0.1, 0.0],
+                },
+                lambda: {
+                    "kind": "mirror",
+                    "names": [f"body.{name}" for name in list(data["body"])[:2]],
+                    "axis": choose("xy"),
+                },
+                lambda: {"kind": "pose", "angles": dict.fromkeys(data["body"], 0.5)},
+            ]
+        )()
 
 
 def outcome(text, action):
@@ -178,13 +222,87 @@ def test_random_actions_change_nothing_else_or_are_refused_in_one_line(name):
 
 def test_messages_of_nonsense_are_refused_in_one_line():
     hand = random.Random(7)
-    values = [None, 1, -1.5, float("nan"), 1e999, "", "x" * 300, "A", "ground.A", [], [1], [1, 2], ["a", "b"], {}, {"a": []},
-              True, ["body", 0], "body.link1", [["ground.A", "link1.B"]], "\n", [[0, 0], [0, 0]], 10**400]  # fmt: skip
-    keys = ["at", "points", "name", "joint", "joints", "a", "b", "type", "ref", "to", "place", "text", "value", "names", "by",
-            "axis", "about", "body", "assembly", "angles", "motors", "speed", "direction", "of", "flexible"]  # fmt: skip
-    kinds = ["add-ground", "add-link", "add-joint", "add-slider", "add-point", "add-motor", "add-mode", "add-drive", "add-gear",
-             "add-spring", "add-damper", "add-load", "add-lump", "add-sensor", "set-effector", "add-path", "add-gravity", "set",
-             "unset", "rename", "copy", "mirror", "delete", "pose", "move-point", "none", None, []]  # fmt: skip
+    values = [
+        None,
+        1,
+        -1.5,
+        float("nan"),
+        1e999,
+        "",
+        "x" * 300,
+        "A",
+        "ground.A",
+        [],
+        [1],
+        [1, 2],
+        ["a", "b"],
+        {},
+        {"a": []},
+        True,
+        ["body", 0],
+        "body.link1",
+        [["ground.A", "link1.B"]],
+        "\n",
+        [[0, 0], [0, 0]],
+        10**400,
+    ]
+    keys = [
+        "at",
+        "points",
+        "name",
+        "joint",
+        "joints",
+        "a",
+        "b",
+        "type",
+        "ref",
+        "to",
+        "place",
+        "text",
+        "value",
+        "names",
+        "by",
+        "axis",
+        "about",
+        "body",
+        "assembly",
+        "angles",
+        "motors",
+        "speed",
+        "direction",
+        "of",
+        "flexible",
+    ]
+    kinds = [
+        "add-ground",
+        "add-link",
+        "add-joint",
+        "add-slider",
+        "add-point",
+        "add-motor",
+        "add-mode",
+        "add-drive",
+        "add-gear",
+        "add-spring",
+        "add-damper",
+        "add-load",
+        "add-lump",
+        "add-sensor",
+        "set-effector",
+        "add-path",
+        "add-gravity",
+        "set",
+        "unset",
+        "rename",
+        "copy",
+        "mirror",
+        "delete",
+        "pose",
+        "move-point",
+        "none",
+        None,
+        [],
+    ]
     for text in (EMPTY, drawn(CHAIN)):
         for _ in range(400):
             chosen = {key: hand.choice(values) for key in hand.sample(keys, 6)}
@@ -268,7 +386,7 @@ def test_drawn_manipulators_follow_their_paths(actions, tmp_path):
     model = loaded(drawn(actions), tmp_path)
     assert [mode.name for mode in model.modes()] == ["++"]
     task = model.plan(samples=51)
-    assert task.times[-1] == pytest.approx(model.paths["path1"].duration)
+    assert task.motion.t[-1] == pytest.approx(model.paths["path1"].duration)
 
 
 def test_deleting_all_bodies_leads_back_to_a_sheet_that_can_be_drawn_on():
@@ -322,7 +440,7 @@ def test_a_link_turns_to_the_place_of_its_point():
 
 
 def test_an_expression_of_several_parameters_is_refused_with_their_names():
-    with pytest.raises(InputError, match="parameters.l, parameters.w"):
+    with pytest.raises(InputError, match=r"parameters\.l, parameters\.w"):
         move("ground.A", [-0.1, 0.2])
 
 
@@ -339,7 +457,7 @@ def test_points_at_the_end_of_a_beam_follow_the_length_typed_for_it():
     text = apply(drawn(CHAIN), {"kind": "set", "place": ["body", "link1", "length"], "text": "95 mm"}).text
     body = tomllib.loads(text)["body"]["link1"]
     assert body["length"] == body["points"]["B"] == "95 mm"
-    with pytest.raises(InputError, match="body.link1.length"):
+    with pytest.raises(InputError, match=r"body\.link1\.length"):
         apply(text, {"kind": "set", "place": ["body", "link1", "length"], "text": "5 kg"})
 
 
@@ -351,7 +469,7 @@ def test_deleting_names_what_depends_and_keeps_the_rest_in_place():
     assert edited.note == "also deleted: joint.A, joint.C, motor.motor1, mode.++"
     before, after = Sheet(text), Sheet(edited.text)
     assert after.place("link3.C", "drawn") == pytest.approx(before.place("link3.C", "drawn"), abs=1e-6)
-    with pytest.raises(InputError, match="is used by body.link1"):
+    with pytest.raises(InputError, match=r"is used by body\.link1"):
         apply(text, {"kind": "delete", "names": ["section.bar"]})
 
 
@@ -448,8 +566,15 @@ def test_members_and_their_fields():
     assert members["body", "distal1"]["owns"] == [["joint", "B1"], ["joint", "C"], ["end_effector"]]
     found = fields(text, ["body", "proximal1"])
     length = next(row for row in found["fields"] if row["label"] == "length")
-    assert length == {"place": ["body", "proximal1", "length"], "label": "length", "text": "l1", "value": 0.25, "unit": "m",
-                      "help": "the length in m", "choices": None}  # fmt: skip
+    assert length == {
+        "place": ["body", "proximal1", "length"],
+        "label": "length",
+        "text": "l1",
+        "value": 0.25,
+        "unit": "m",
+        "help": "the length in m",
+        "choices": None,
+    }
     assert {"label": "flexible", "help": "false for a rigid beam", "unit": ""} in found["addable"]
 
 

@@ -289,6 +289,38 @@ def test_a_program_makes_an_equal_mechanism(name):
     assert made["mechanism"].description == mechanism.description
 
 
+TABLES = """
+[prescribed.turn]
+joint = "pivot"
+table = [[0.0, 0.0], [1.0, 0.4], [2.0, 0.0]]
+
+[load.push]
+type = "force"
+point = "beam.tip"
+force = ["-k * pivot.rate", 0.0]
+
+[sensor.gauge]
+type = "strain"
+body = "beam"
+at = 0.1
+
+[parameters]
+k = 0.2
+"""
+
+
+def test_a_program_has_profiles_laws_sensors_and_payload():
+    text = PENDULUM.replace(
+        "[study]", f'{TABLES}\n[end_effector]\npoint = "beam.tip"\n\n[payload]\nmass = 0.1\n\n[study]'
+    )
+    made = {}
+    exec(leaving.program(text), made)
+    mechanism = model_of(text).mechanism
+    assert made["mechanism"] == mechanism
+    assert made["mechanism"].payload == mechanism.payload is not None
+    assert len(mechanism.sensors) == len(mechanism.loads) == len(mechanism.prescribed) == 1
+
+
 def test_a_program_has_names_of_the_file_and_executes_no_text_of_it():
     text = FIVE_BAR.replace("[section.bar]", '[section."class"]').replace('section = "bar"', 'section = "class"')
     text = text.replace('name = "five-bar"', 'name = "five\\nimport nothing\\u0000\\u2028import nothing"')

@@ -230,14 +230,24 @@ def _couplers(motion: ExactMotion) -> Iterator[tuple[str, str, PointRef, PointRe
             yield one.name, one.name, one.a, one.b
 
 
-def _transmissions(motion: ExactMotion) -> Iterator[Transmission]:
-    """Yield the transmission angles of couplers at bodies that are guided by the ground and not driven."""
-    guides, driven, t = _guides(motion), _driven(motion), motion.solution.t
+def transmission_angles(motion: ExactMotion, q: Array) -> list[tuple[str, str, Array]]:
+    """Return the transmission angles (k,) at poses (k, n) [rad], with joints and couplers: see `Transmission`."""
+    return [(joint, coupler, 0.5 * math.pi - np.abs(pressure(q))) for joint, coupler, pressure in _pressures(motion)]
+
+
+def _pressures(motion: ExactMotion) -> Iterator[tuple[str, str, Callable[[Array], Array]]]:
+    """Yield joint, coupler and pressure angle of couplers at bodies that are guided by the ground and not driven."""
+    guides, driven = _guides(motion), _driven(motion)
     for coupler, joint, far, near in _couplers(motion):
         guide = guides.get(far.body)
-        if far.on_ground or guide is None or guide.name in driven or near.body == GROUND:
-            continue
-        pressure = partial(_pressure_angle, motion, far, near, guide)
+        if not (far.on_ground or guide is None or guide.name in driven or near.body == GROUND):
+            yield joint, coupler, partial(_pressure_angle, motion, far, near, guide)
+
+
+def _transmissions(motion: ExactMotion) -> Iterator[Transmission]:
+    """Yield the transmission angles of couplers at bodies that are guided by the ground and not driven."""
+    t = motion.solution.t
+    for joint, coupler, pressure in _pressures(motion):
         values = pressure(motion.solution.q)
 
         def at(time: float, pressure: Callable[[Array], Array] = pressure) -> float:

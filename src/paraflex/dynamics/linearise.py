@@ -101,13 +101,7 @@ def natural_frequencies(
     count : int, optional
         Number of the lowest vibrations; all by default, or ten for more than 600 coordinates.
     """
-    M, J = sparse_mass(system, state.q), sparse_jacobian(system, state.q)
-    efforts = sparse_joint_rows(system, dict.fromkeys([*held, *torque_at]), state.q)
-    lam, _, acceleration = forces_at_rest(system, state, M, J, efforts)
-    elastic, other = stiffness_diagonal(system), pose_stiffness(system, state.time, state.q, lam)
-    C = scipy.sparse.csr_matrix(scipy.sparse.vstack([J, sparse_joint_rows(system, dict.fromkeys(held), state.q)]))
-    typical = typical_square(elastic, other, M)
-    K = scipy.sparse.csr_matrix(other + scipy.sparse.diags(elastic))
+    M, K, C, elastic, typical, acceleration = _about(system, state, held, torque_at)
     if system.n <= DENSE_COORDINATES:
         squares, shapes = all_modes(K, M, C, elastic, typical)
     else:
@@ -116,6 +110,42 @@ def natural_frequencies(
     kept = slice(squares.size if count is None else count)
     complete = system.n <= DENSE_COORDINATES and (count is None or count >= squares.size)
     return Vibration(squares[kept], shapes[:, kept], acceleration, complete)
+
+
+def compliance(system: System, state: State, held: Sequence[str], rows: Array) -> Array:
+    """Return the displacements (k, k) of points by unit forces there, about a pose with joints held.
+
+    Parameters
+    ----------
+    system, state, held
+        See `natural_frequencies`.
+    rows : (k, n) array
+        Derivatives of the points' positions by the coordinates.
+    """
+    _, K, C, *_ = _about(system, state, held, ())
+    return rows @ Saddle(K, C).solve(rows.T, np.zeros((C.shape[0], len(rows))))[0]
+
+
+class _Linear(NamedTuple):
+    """Mass, stiffness and constraint matrices about a pose, stiffness of beams, typical square, and acceleration."""
+
+    M: Sparse
+    K: Sparse
+    C: Sparse
+    elastic: Array
+    typical: float
+    acceleration: float
+
+
+def _about(system: System, state: State, held: Sequence[str], torque_at: Sequence[str]) -> _Linear:
+    """Return the matrices about a pose whose joints are held, or have motors of constant torque."""
+    M, J = sparse_mass(system, state.q), sparse_jacobian(system, state.q)
+    efforts = sparse_joint_rows(system, dict.fromkeys([*held, *torque_at]), state.q)
+    lam, _, acceleration = forces_at_rest(system, state, M, J, efforts)
+    elastic, other = stiffness_diagonal(system), pose_stiffness(system, state.time, state.q, lam)
+    C = scipy.sparse.csr_matrix(scipy.sparse.vstack([J, sparse_joint_rows(system, dict.fromkeys(held), state.q)]))
+    K = scipy.sparse.csr_matrix(other + scipy.sparse.diags(elastic))
+    return _Linear(M, K, C, elastic, typical_square(elastic, other, M), acceleration)
 
 
 def slowest_deflection(system: System, q: Array) -> float:

@@ -1,136 +1,21 @@
-"""Actions that add members to a mechanism."""
+"""Actions that add motors, forces, sensors and paths to a mechanism."""
 
-from collections.abc import Callable, Mapping, Sequence
-from math import cos, floor, hypot, log10, pi, sin
+from collections.abc import Callable, Mapping
+from itertools import pairwise
+from math import floor, hypot, log10, pi
 from typing import Any
 
 from paraflex.driven.ranges import freedoms_at
 from paraflex.errors import InputError, NumericalError
-from paraflex.mechanism import JOINT_KINDS
-from paraflex.mechanism.joints import GROUND
-from paraflex.mechanism.poses import Pose
 from paraflex.mechanism.quantities import known
 from .changing import rename
-from .sheet import XY, Action, Done, Sheet, check_name, direction, placed, tidy, without_spare_places
+from .linking import add_ground, add_joint, add_link, add_point, add_slider
+from .sheet import Action, Done, Sheet, check_name
 
-_SECTION = {"width": "30 mm", "thickness": "5 mm"}
-_MATERIAL = {"youngs_modulus": "70 GPa", "density": 2700.0}
 _LUMP = {"mass": "0.1 kg", "inertia": "20 kg mm^2"}
 # Time in which a new path is run through [s]; the acceleration follows.
 _MOTION = 0.5
 _COORDINATES = {1: ["x"], 2: ["x", "y"], 3: ["x", "y", "angle"]}
-
-
-def add_ground(sheet: Sheet, action: Action) -> Done:
-    """Add a point of the ground."""
-    name = action.get("name") or sheet.fresh_point()
-    check_name(name, sheet.names("ground"), f"ground.{name}")
-    return sheet.put(("ground", name), tidy(_xy(action, "at"))), f"ground.{name}"
-
-
-def add_link(sheet: Sheet, action: Action) -> Done:
-    """Add a link through points; a point of another body or of the ground becomes a revolute joint."""
-    ends = action.get("points")
-    if not isinstance(ends, Sequence) or isinstance(ends, str) or len(ends) < 2:
-        raise InputError("needs two points", field="points", value=ends, remedy="give places [x, y] or points")
-    body, before = sheet.free_name(action, "body", "link"), sheet
-    names = _names_of(sheet, ends)
-    sheet = _with_assembly(sheet)
-    shown = action.get("assembly") or sheet.shown
-    places = {each: [_place(before, end, each) for end in ends] for each in sheet.names("assembly")}
-    origin, angle = places[shown][0], direction(places[shown][0], places[shown][1])
-    local = [_turned((x - origin[0], y - origin[1]), -angle) for x, y in places[shown]]
-    sheet = _with_body(sheet, body, dict(zip(names, local, strict=True)), bool(action.get("flexible")))
-    frames = {}
-    for each, (start, second, *_) in places.items():
-        turned = direction(start, second) if isinstance(ends[0], str) and isinstance(ends[1], str) else angle
-        frames[each] = {body: Pose(turned, start)}
-        sheet = sheet.put(("assembly", each, body), turned)
-    for name, end in zip(names, ends, strict=True):
-        if isinstance(end, str):
-            joint = name if name not in sheet.names("joint") else sheet.fresh(name, "joint")
-            sheet = sheet.put(("joint", joint), [end, f"{body}.{name}"])
-    if not any(isinstance(end, str) for end in ends[:1]):
-        held = next((k for k, end in enumerate(ends) if isinstance(end, str)), None)
-        frames = frames if held is None else _held_at(frames, body, local[held], places, held)
-    return placed(before, sheet, frames), f"body.{body}"
-
-
-def add_joint(sheet: Sheet, action: Action) -> Done:
-    """Add a joint of any kind between two points; its `direction` counts in the ground frame [rad]."""
-    kind, a, b = (action.get(key, default) for key, default in (("type", "revolute"), ("a", ""), ("b", "")))
-    known(kind, list(JOINT_KINDS), "type", "kind of joint")
-    shown, before = action.get("assembly") or sheet.shown, sheet
-    if str(b).startswith(f"{GROUND}."):
-        a, b = b, a
-    start, end = sheet.place(a, shown), sheet.place(b, shown)
-    name = _free_joint(sheet, action, a, b)
-    turned = [sheet.angle(ref.partition(".")[0], shown) for ref in (a, b)]
-    fields = {}
-    if "axis" in JOINT_KINDS[kind].holds and not JOINT_KINDS[kind].follows_beam:
-        along = action.get("direction")
-        apart = hypot(end[0] - start[0], end[1] - start[1]) > 1e-9
-        fields["direction"] = (direction(start, end) if apart else 0.0) if along is None else float(along)
-        fields["direction"] -= turned[0]
-    if "angle" in JOINT_KINDS[kind].holds:
-        fields["angle"] = turned[1] - turned[0]
-    if "distance" in JOINT_KINDS[kind].holds:
-        fields["length"] = hypot(end[0] - start[0], end[1] - start[1])
-    fields = {key: value for key, value in fields.items() if abs(value) > 1e-6}
-    if kind == "revolute":
-        sheet = sheet.put(("joint", name), [a, b])
-    else:
-        sheet = sheet.table(("joint", name), {"type": kind, "points": [a, b]} | fields)
-    bodies = {ref.partition(".")[0] for ref in (a, b)}
-    return placed(before, without_spare_places(sheet, bodies)), f"joint.{name}"
-
-
-def add_slider(sheet: Sheet, action: Action) -> Done:
-    """Add a rail on the ground, and a block on it that is pinned to a point; or a pin in a slot if `block` is false."""
-    at, along = action.get("at"), float(action.get("direction") or 0.0)
-    before, sheet = sheet, _with_assembly(sheet)
-    shown = action.get("assembly") or sheet.shown
-    place = _place(before, at, shown)
-    pinned = isinstance(at, str) and not at.startswith(f"{GROUND}.")
-    if isinstance(at, str) and not pinned:
-        rail = at
-    else:
-        point = sheet.fresh_point()
-        rail, sheet = f"{GROUND}.{point}", sheet.put(("ground", point), tidy(place))
-    if action.get("block", True) is False:
-        if not pinned:
-            raise InputError(
-                "a slot holds the point of a link", field="at", value=at, remedy="choose a point of a link"
-            )
-        return add_joint(sheet, {"type": "slot", "a": rail, "b": at, "direction": along, "assembly": shown})
-    body = sheet.free_name(action, "body", "slider")
-    pin = str(at).partition(".")[2] if pinned else rail.partition(".")[2]
-    sheet = sheet.table(("body", body), {"type": "rigid", "points": {pin: [0.0, 0.0]}})
-    frames = {}
-    for each in sheet.names("assembly"):
-        sheet = sheet.put(("assembly", each, body), 0.0)
-        frames[each] = {body: Pose(0.0, _place(before, at, each) if pinned else place)}
-    if pinned:
-        name = pin if pin not in sheet.names("joint") else sheet.fresh(pin, "joint")
-        sheet = sheet.put(("joint", name), [at, f"{body}.{pin}"])
-    name = sheet.fresh("rail", "joint")
-    direct = {"direction": along} if along else {}
-    sheet = sheet.table(("joint", name), {"type": "prismatic", "points": [rail, f"{body}.{pin}"]} | direct)
-    return placed(before, sheet, frames), f"joint.{name}"
-
-
-def add_point(sheet: Sheet, action: Action) -> Done:
-    """Add a further point to a link."""
-    body, shown = _known(sheet, action, "body"), action.get("assembly") or sheet.shown
-    frame = sheet.frames.get(shown, {}).get(body)
-    if frame is None or frame.position is None:
-        raise InputError("its place is not known", field=f"body.{body}", remedy="give its angle in an assembly")
-    name = action.get("name") or sheet.fresh_point()
-    check_name(name, sheet.locals[body], f"body.{body}.points.{name}")
-    x, y = _xy(action, "at")
-    local = _turned((x - frame.position[0], y - frame.position[1]), -frame.angle)
-    on_axis = sheet.data["body"][body].get("type") in ("beam", "assumed-modes")
-    return sheet.put(("body", body, "points", name), local[0] if on_axis else tidy(local)), f"body.{body}"
 
 
 def add_motor(sheet: Sheet, action: Action) -> Done:
@@ -249,7 +134,7 @@ def add_path(sheet: Sheet, action: Action) -> Done:
         table |= {"start": corners[0], "end": corners[1]}
     elif corners:
         table["points"] = corners
-    size = max((hypot(a[0] - b[0], a[1] - b[1]) for a, b in zip(corners, corners[1:], strict=False)), default=0.0)
+    size = max((hypot(a[0] - b[0], a[1] - b[1]) for a, b in pairwise(corners)), default=0.0)
     size = size or 2.0 * pi * float(action.get("radius", 0.05))
     if kind in ("polygon", "line", "circle"):
         table.setdefault("max_acceleration", _round(5.0 * size / _MOTION**2))
@@ -269,75 +154,6 @@ def add_gravity(sheet: Sheet, action: Action) -> Done:
 def _member(sheet: Sheet, action: Action, table: str, fields: Mapping[str, Any], stem: str = "") -> Done:
     name = sheet.free_name(action, table, stem or table)
     return sheet.table((table, name), fields), f"{table}.{name}"
-
-
-def _xy(action: Action, key: str) -> XY:
-    place = action.get(key)
-    if isinstance(place, Sequence) and not isinstance(place, str) and len(place) == 2:
-        return float(place[0]), float(place[1])
-    raise InputError("not a place", field=key, value=place, remedy="give [x, y] in m")
-
-
-def _place(sheet: Sheet, at: Any, assembly: str) -> XY:
-    return sheet.place(at, assembly) if isinstance(at, str) else _xy({"at": at}, "at")
-
-
-def _turned(place: XY, angle: float) -> XY:
-    c, s = cos(angle), sin(angle)
-    return c * place[0] - s * place[1], s * place[0] + c * place[1]
-
-
-def _names_of(sheet: Sheet, ends: Sequence[Any]) -> list[str]:
-    """Return a name for each point of a new link: that of the point to which it is joined, or a fresh one."""
-    names: list[str] = []
-    for end in ends:
-        shared = end.partition(".")[2] if isinstance(end, str) else ""
-        taken = [*names, *(each.partition(".")[2] for each in ends if isinstance(each, str))]
-        names.append(shared if shared and shared not in names else sheet.fresh_point(taken))
-    return names
-
-
-def _with_assembly(sheet: Sheet) -> Sheet:
-    """Return a sheet with an assembly; a first one is named "drawn"."""
-    if sheet.names("assembly"):
-        return sheet
-    return sheet.table(("assembly", "drawn"), {})
-
-
-def _with_body(sheet: Sheet, body: str, points: Mapping[str, XY], flexible: bool) -> Sheet:
-    (_, (_, _)), (last, (length, _)), *further = points.items()
-    if further or not flexible:
-        return sheet.table(("body", body), {"type": "rigid", "points": {key: tidy(xy) for key, xy in points.items()}})
-    sheet, section = _with_first(sheet, "section", "bar", _SECTION)
-    sheet, material = _with_first(sheet, "material", "aluminium", _MATERIAL)
-    table = {"type": "beam", "length": length, "section": section, "material": material,
-             "points": {next(iter(points)): 0.0, last: length}, "elements": 3}  # fmt: skip
-    return sheet.table(("body", body), table)
-
-
-def _with_first(sheet: Sheet, table: str, name: str, default: Mapping[str, Any]) -> tuple[Sheet, str]:
-    """Return the first name of a table, after adding a default if it has none."""
-    names = sheet.names(table)
-    return (sheet, names[0]) if names else (sheet.table((table, name), default), name)
-
-
-def _held_at(
-    frames: Mapping[str, Mapping[str, Pose]], body: str, local: XY, places: Mapping[str, Sequence[XY]], held: int
-) -> dict[str, dict[str, Pose]]:
-    """Return poses of a body that is held at a point other than its first."""
-    out = {}
-    for assembly, poses in frames.items():
-        arm = _turned(local, poses[body].angle)
-        x, y = places[assembly][held]
-        out[assembly] = {body: Pose(poses[body].angle, (x - arm[0], y - arm[1]))}
-    return out
-
-
-def _free_joint(sheet: Sheet, action: Action, a: str, b: str) -> str:
-    if action.get("name") is not None:
-        return sheet.free_name(action, "joint", "joint")
-    point = b.partition(".")[2]
-    return point if point not in sheet.names("joint") else sheet.fresh(point, "joint")
 
 
 def _known(sheet: Sheet, action: Action, table: str) -> str:

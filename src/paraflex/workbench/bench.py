@@ -18,7 +18,8 @@ from .document import Document
 from .messages import Message, described
 from .moving import Mover, assemblies
 from .picture import ground_picture, picture
-from .seeing import Seeing, readiness
+from .readiness import readiness
+from .seeing import Seeing
 
 
 class Bench:
@@ -88,7 +89,7 @@ class Bench:
             else:
                 self._moved = False
             self._mover = fresh
-            self._seeing = Seeing(model, fresh)
+            self._seeing = Seeing(model, self._seeing)
         except (InputError, NumericalError) as error:
             self._mover, self._seeing = None, None
             try:
@@ -136,7 +137,7 @@ class Bench:
 
     def state(self) -> Message:
         """Return what a page shows of the model."""
-        mechanism = None if self.model is None else self.model.mechanism
+        mechanism, seen = None if self.model is None else self.model.mechanism, self.seen()
         return {
             "picture": self.picture(),
             "problem": None if self.problem is None else described(self.problem),
@@ -144,8 +145,8 @@ class Bench:
             "assembly": self._assembly,
             "moved": self._moved,
             "mode": self.mode,
-            "seen": self.seen(),
-            "ready": readiness(self._document.text, self.model, self.problem),
+            "seen": seen,
+            "ready": readiness(self.model, self.problem, seen, {} if self._open is None else dict(self._open.gaps)),
         }
 
     def choose_mode(self, name: str) -> Message:

@@ -18,7 +18,7 @@ _IN_LINE = 1e-6
 # Bodies that move less than this with an elbow held belong to a loop of one freedom.
 _HELD = 1e-8
 # A dragged pose stays this far from a zero of a quantity, or half its first value; smaller first values have no sign.
-MARGIN, _NO_SIGN = 1e-4, 1e-7
+MARGIN, NO_SIGN = 1e-4, 1e-7
 # Value from which on a quantity without a sign at first has one.
 _CLEAR = 1e-3
 
@@ -60,9 +60,9 @@ class Guard:
     def begin(self, q: Array) -> None:
         """Take the sign at a pose, if it has one."""
         value = self.value(q)
-        if not self.sign and abs(value) > _NO_SIGN:
+        if not self.sign and abs(value) > NO_SIGN:
             self.sign = float(np.sign(value))
-        self.margin = min(self.margin, 0.5 * max(abs(value), _NO_SIGN))
+        self.margin = min(self.margin, 0.5 * max(abs(value), NO_SIGN))
 
     def pass_by(self, q: Array) -> None:
         """Take the sign at a pose on the way, if there was none and it is clear now."""
@@ -152,21 +152,15 @@ class Branches:
         """Return the elbow at a joint; None if a body is no link there."""
         if joint.holds != ("points",) or joint.a.on_ground or joint.b.on_ground or joint.a.body == joint.b.body:
             return None
-        arms = [self._arm(joint, ref) for ref in (joint.a, joint.b)]
-        if arms[0] is None or arms[1] is None:
+        first, second = self._arm(joint, joint.a), self._arm(joint, joint.b)
+        if first is None or second is None:
             return None
-        (one, along), (other, beside) = arms
+        (one, along), (other, beside) = first, second
         a, b = (self.system.body(ref.body).angle for ref in (joint.a, joint.b))
-        square = along != beside
-        text = (
-            f"{joint.b.body} square to the slide of {joint.a.body}"
-            if beside < along
-            else (
-                f"{joint.a.body} square to the slide of {joint.b.body}"
-                if square
-                else f"{joint.a.body} and {joint.b.body} in line"
-            )
-        )
+        text = f"{joint.a.body} and {joint.b.body} in line"
+        if along != beside:
+            link, slide = (joint.b, joint.a) if along else (joint.a, joint.b)
+            text = f"{link.body} square to the slide of {slide.body}"
         return Elbow(joint.name, a, b, other - one, text)
 
     def _arm(self, joint: Joint, ref: PointRef) -> tuple[float, bool] | None:

@@ -150,11 +150,8 @@ def _doubled(sheet: Sheet, action: Action, image: Callable[[Pose], Pose], *, mir
     bodies = [str(thing[1]) for thing in named if thing[0] == "body"]
     if not named or (not bodies and not any(thing[0] == GROUND for thing in named)):
         raise InputError("nothing to copy", field="names", value=action.get("names"), remedy="choose bodies or points")
-    refs = {use.text for use in uses(sheet.data) if use.kind == "ref" and use.place[0] == "joint"
-            and any(each.place[:2] == use.place[:2] and each.text.partition(".")[0] in bodies for each in uses(sheet.data)
-                    if each.kind == "ref")}  # fmt: skip
-    grounds = [ref.partition(".")[2] for ref in refs if ref.startswith(f"{GROUND}.")]
-    grounds = list(dict.fromkeys([str(thing[1]) for thing in named if thing[0] == GROUND] + sorted(grounds)))
+    chosen = [str(thing[1]) for thing in named if thing[0] == GROUND]
+    grounds = list(dict.fromkeys(chosen + _pivots(sheet, bodies)))
     names: dict[Place, str] = {}
     for name in grounds:
         old = sheet.place(f"{GROUND}.{name}", sheet.shown)
@@ -179,6 +176,12 @@ def _doubled(sheet: Sheet, action: Action, image: Callable[[Pose], Pose], *, mir
     return placed(
         before, sheet, frames
     ), f"body.{names['body', bodies[-1]]}" if bodies else f"ground.{names[named[-1]]}"
+
+
+def _pivots(sheet: Sheet, bodies: Sequence[str]) -> list[str]:
+    """Return the ground points to which bodies are joined."""
+    pairs = [(joint.a, joint.b) for joint in sheet.joints] + [(joint.b, joint.a) for joint in sheet.joints]
+    return [one.point for one, other in pairs if one.on_ground and other.body in bodies]
 
 
 def _with_copy(
@@ -271,5 +274,6 @@ def _value(sheet: Sheet, use: Use) -> list[float]:
 
 
 CHANGING: dict[str, Callable[[Sheet, Action], Done]] = {
-    "set": set_value, "unset": unset, "rename": rename, "copy": copied, "mirror": mirrored, "delete": delete, "pose": pose,
+    "set": set_value, "unset": unset, "rename": rename, "copy": copied, "mirror": mirrored, "delete": delete,
+    "pose": pose,
 }  # fmt: skip

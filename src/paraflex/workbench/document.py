@@ -9,6 +9,7 @@ from paraflex.errors import InputError, OutputError
 from paraflex.files.library import library_names, library_text
 from paraflex.files.read import exists, read_text
 from paraflex.writing import write_text
+from .leaving import text_of_link
 
 EMPTY = 'name = "untitled"\n'
 # Largest number of steps that can be undone, and of characters of all their texts.
@@ -21,7 +22,7 @@ class Document:
     Parameters
     ----------
     source : str, optional
-        File, which need not exist yet, or name of a library mechanism; an empty sheet by default.
+        File, which need not exist yet, name of a library mechanism, or link of a model; an empty sheet by default.
     text : str, optional
         Text of a model without a file, in place of a source.
     drafts : Path, optional
@@ -35,7 +36,7 @@ class Document:
 
     def __init__(self, source: str | None = None, *, text: str | None = None, drafts: Path | None = None) -> None:
         self.file, text = _opened(source) if text is None else (None, text)
-        self.name: str = source or "untitled"
+        self.name: str = "untitled" if source is None or "#model=" in source else source
         self.folder: Path = Path() if self.file is None else self.file.parent
         self._steps, self._now, self._on_disk = [text], 0, text if self.file is not None else None
         self._stamp = self._stamped()
@@ -169,9 +170,11 @@ class Document:
 
 
 def _opened(source: str | None) -> tuple[Path | None, str]:
-    """Return the file of a source, None for an empty sheet and for the library, and its text."""
+    """Return the file of a source, None for an empty sheet, a link and the library, and its text."""
     if source is None:
         return None, EMPTY
+    if "#model=" in source:
+        return None, text_of_link(source)
     file = Path(source)
     if exists(file) or file.suffix == ".toml":
         return file, read_text(file) if exists(file) else EMPTY

@@ -10,7 +10,7 @@ import scipy
 from paraflex.arrays import Array
 from paraflex.dynamics import System
 from paraflex.kernel.constraints import constraint_values
-from paraflex.kernel.packed import Signals, make_scratch
+from paraflex.kernel.packed import Scratch, Signals, make_scratch
 from .branches import Guard
 
 # Longest and shortest step, and step of the finite differences for second derivatives [sizes of the mechanism, rad].
@@ -19,8 +19,10 @@ _LONGEST, _SHORTEST, _DIFFERENCE = 0.2, 1e-11, 1e-6
 REACHED = 1e-9
 # Largest residual of closed loops [sizes of the mechanism, rad], iterations with one factor, and factors.
 _CLOSED, _CHORDS, _FACTORS = 1e-13, 6, 4
-# Slopes and curvatures below these are zero; weight of violated guards beside the distance.
-_LEVEL, _FLAT, _WEIGHT = 1e-10, 1e-7, 10.0
+# Part of its margin that a guard may lose by curvature.
+_SPARE = 0.7
+# Slopes and curvatures below these, relative to the distance, are zero; weight of violated guards beside the distance.
+_LEVEL, _FLAT, _WEIGHT = 1e-10, 1e-6, 10.0
 
 
 class Slope(NamedTuple):
@@ -79,24 +81,27 @@ class Dragging:
 
     def approach(self, q: Array, target: Array, iterations: int) -> Array:
         """Return the pose nearest to a target that continuous motion from q leads to, or one on the way there."""
-        longest, merit = _LONGEST, self._merit(q, target)
+        longest, room = _LONGEST, self.room(q)
         for _ in range(iterations):
             if self.distance(q, target) <= 0.1 * REACHED:
                 break
             slope = self.slope(q, target)
-            step = self._step(q, slope, longest)
+            step, merit = self._step(q, target, slope, room, longest), self._merit(q, target, room)
             length = float(np.max(np.abs(step), initial=0.0))
             while length > _SHORTEST:
                 trial = self.closed(q, step, slope.inverse)
-                if trial is not None and self._inside(trial) and self._merit(trial, target) < merit:
-                    break
+                if trial is not None:
+                    left = self.room(trial)
+                    if np.all(left > -_SPARE * self._margins) and self._merit(trial, target, left) < merit:
+                        break
                 step, length = 0.25 * step, 0.25 * length
             else:
                 break
-            longest = min(_LONGEST, 4.0 * length)
-            q, merit = trial, self._merit(trial, target)
-            for guard in self.guards:
-                guard.pass_by(q)
+            q, room, longest = trial, left, min(_LONGEST, 4.0 * length)
+            if any(not guard.sign for guard in self.guards):
+                for guard in self.guards:
+                    guard.pass_by(q)
+                room = self.room(q)
         return q
 
     def slope(self, q: Array, target: Array) -> Slope:
@@ -104,16 +109,16 @@ class Dragging:
         jacobian, rank = self.system.dimensionless_jacobian(q), self.system.n - self.freedoms
         left, sizes, right = np.linalg.svd(jacobian)
         free, inverse = right[rank:].T, right[:rank].T @ (left[:, :rank] / sizes[:rank]).T
-        slope = self._slope(q, target)
-        multipliers = -inverse.T @ slope
+        rows, off = self.rows(q), (self.place(q) - target) / self.system.size
+        slope = rows.T @ off
+        multipliers, columns = -inverse.T @ slope, []
         here = slope + jacobian.T @ multipliers
-        columns = []
         for column in free.T:
             there = q + _DIFFERENCE * self.system.units * column
-            moved = self._slope(there, target) + self.system.dimensionless_jacobian(there).T @ multipliers
+            moved = self.rows(there).T @ off + self.system.dimensionless_jacobian(there).T @ multipliers
             columns.append(free.T @ (moved - here) / _DIFFERENCE)
-        curvature = np.array(columns).reshape(self.freedoms, self.freedoms)
-        return Slope(free, inverse, free.T @ slope, 0.5 * (curvature + curvature.T))
+        curvature, along = np.array(columns).reshape(self.freedoms, self.freedoms), rows @ free
+        return Slope(free, inverse, free.T @ slope, 0.5 * (curvature + curvature.T) + along.T @ along)
 
     def closed(self, q: Array, step: Array, inverse: Array) -> Array | None:
         """Return the pose after a dimensionless step, loops closed by least changes; None if these exceed the step."""
@@ -135,49 +140,57 @@ class Dragging:
         return None
 
     @cached_property
-    def _scratch(self) -> tuple[Array, Array, Array, Array]:
-        return make_scratch(self.system.packed), np.zeros(self.system.n), *np.zeros((2, self.system.m))
+    def _scratch(self) -> tuple[Scratch, Array, Array, Array]:
+        return (
+            make_scratch(self.system.packed),
+            np.zeros(self.system.n),
+            np.zeros(self.system.m),
+            np.zeros(self.system.m),
+        )
 
     def _residual(self, q: Array) -> Array:
         scratch, still, phi, rate = self._scratch
         constraint_values(self.system.packed, self.signals, 0.0, q, still, scratch, phi, rate)
         return phi / self.system.row_units
 
-    def _slope(self, q: Array, target: Array) -> Array:
-        return self.rows(q).T @ (self.place(q) - target) / self.system.size
+    def room(self, q: Array) -> Array:
+        """Return the room of every guard at a pose."""
+        return np.array([guard.room(q) for guard in self.guards])
 
-    def _merit(self, q: Array, target: Array) -> float:
+    @property
+    def _margins(self) -> Array:
+        return np.array([guard.margin for guard in self.guards])
+
+    def _merit(self, q: Array, target: Array, room: Array) -> float:
         """Return the distance, and more where guards have less room than their margins."""
         distance = self.distance(q, target)
-        return distance + _WEIGHT * min(distance, 1.0) * sum(max(0.0, -guard.room(q)) for guard in self.guards)
+        return distance + _WEIGHT * min(distance, 1.0) * float(np.sum(np.maximum(-room, 0.0)))
 
-    def _inside(self, q: Array) -> bool:
-        return all(guard.room(q) > -0.7 * guard.margin for guard in self.guards)
-
-    def _step(self, q: Array, slope: Slope, longest: float) -> Array:
+    def _step(self, q: Array, target: Array, slope: Slope, room: Array, longest: float) -> Array:
         """Return a dimensionless step downhill, as far as the guards allow to first order."""
         values, vectors = np.linalg.eigh(slope.curvature)
-        along = vectors.T @ slope.gradient
-        scale = np.maximum(np.abs(values), _FLAT)
+        along, distance = vectors.T @ slope.gradient, self.distance(q, target)
+        scale = np.maximum(np.abs(values), _FLAT * distance)
         # Along negative curvature the slope grows: the longest step is right, in either direction if it is zero yet.
-        scale = np.where(values < -_FLAT, np.minimum(scale, np.abs(along) / longest + 1e-300), scale)
+        bent = values < -_FLAT * distance
+        scale = np.where(bent, np.minimum(scale, np.abs(along) / longest + 1e-300), scale)
         move = vectors @ (-along / scale)
-        if np.max(np.abs(along), initial=0.0) <= _LEVEL and values.size and values[0] < -_FLAT:
+        if np.max(np.abs(along), initial=0.0) <= _LEVEL * distance and np.any(bent):
             move = longest * vectors[:, 0]
         move *= min(1.0, longest / max(float(np.max(np.abs(slope.free @ move), initial=0.0)), 1e-300))
-        move = self._allowed(q, slope, move, vectors * np.sqrt(scale))
+        move = self._allowed(q, slope, room, move, vectors * np.sqrt(scale))
         step = slope.free @ move
         return step * min(1.0, longest / max(float(np.max(np.abs(step), initial=0.0)), 1e-300))
 
-    def _allowed(self, q: Array, slope: Slope, move: Array, root: Array) -> Array:
+    def _allowed(self, q: Array, slope: Slope, room: Array, move: Array, root: Array) -> Array:
         """Return the move nearest to one, in the metric root root^T, that leaves all guards room to first order."""
-        guards = [guard for guard in self.guards if guard.sign]
-        if not guards or not move.size:
+        units = self.system.units
+        if np.all(self.room(q + units * (slope.free @ move)) >= 0.0):
             return move
-        room = np.array([guard.room(q) for guard in guards])
-        nearby = [q + _DIFFERENCE * self.system.units * column for column in slope.free.T]
-        change = np.array([[guard.room(there) for there in nearby] for guard in guards]) - room[:, None]
-        change /= _DIFFERENCE
+        nearby = [self.room(q + _DIFFERENCE * units * column) for column in slope.free.T]
+        signed = np.array([bool(guard.sign) for guard in self.guards])
+        room = room[signed]
+        change = (np.array(nearby).T[signed] - room[:, None]) / _DIFFERENCE
         if np.all(room + change @ move >= 0.0):
             return move
         # Least distance programming (Lawson and Hanson): w = root^T (y - move), of least norm, with G w >= h.

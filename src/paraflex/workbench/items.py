@@ -26,7 +26,7 @@ _CHOICES = {
 def outline(text: str) -> list[dict[str, Any]]:
     """Return all members of a file: `kind`, `name`, `place` of each, and `owns`, the places of what belongs to it.
 
-    What names a joint belongs to it (motor, spring, sensor), and so does to a body what names a point of it or the body.
+    A motor, spring or sensor belongs to the joint that it names, a joint or load to the body whose point it names.
     """
     data = Sheet(text).data
     named: dict[tuple[str, ...], list[list[Any]]] = {}

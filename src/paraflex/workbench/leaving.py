@@ -1,4 +1,4 @@
-"""What a person takes away from the workbench: report, drawing, film, program, and a link that opens the model again.
+"""Things that a person takes away from the workbench: report, drawing, film, program, and a link to the same model.
 
 Functions take the text of a model file, the folder to which names of files in it are relative (None for the current
 one), and the name of the model for errors and titles, `source`.

@@ -1,7 +1,8 @@
 """Pose of a mechanism that is dragged by hand: it follows the mouse as closed loops, and stays in its assembly."""
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -16,31 +17,26 @@ from paraflex.dynamics.points import marker_position
 from paraflex.dynamics.projection import assemble, closed, constraint_change
 from paraflex.dynamics.soundness import mobility
 from paraflex.dynamics.state import State
-from paraflex.errors import InputError, NumericalError, listed
-from paraflex.mechanism import (
-    GROUND,
-    ConstantSpeed,
-    Joint,
-    Mechanism,
-    PointRef,
-    RevoluteJoint,
-    WeldJoint,
-)
+from paraflex.errors import InputError, listed
+from paraflex.mechanism import GROUND, ConstantSpeed, Joint, Mechanism, PointRef, RevoluteJoint, WeldJoint
 from paraflex.mechanism.masses import with_any_masses
 from paraflex.mechanism.poses import local_points
 from paraflex.mechanism.quantities import known
 from paraflex.paths.loops import LoopClosure
-from .branches import MARGIN, Branches, Guard
+from .branches import MARGIN, NO_SIGN, Branches, Guard
 from .dragging import REACHED, Dragging
 
 # Longest step of the target [sizes of the mechanism], their largest number, and iterations for a step and at the end.
 _STEP, _MOST_STEPS, _ON_THE_WAY, _AT_THE_END = 0.1, 24, 4, 60
+# Longest step of closures after a change [sizes of the mechanism, rad].
+_LONGEST = 0.2
 # Targets further away are brought nearer [sizes of the mechanism].
 _FAR = 20.0
 # Distance between poses that are remembered, and their number.
 _APART, _REMEMBERED = 0.02, 500
-# Elbows with a smaller sine are named where a drag stops; slopes of the distance below this belong to limits of reach.
-_NAMED, _LEVEL = 1e-2, 1e-2
+# Elbows with a smaller sine are named where a drag stops, slopes of the distance below this belong to limits of reach,
+# and so many elbows are named.
+_NAMED, _LEVEL, _LISTED = 1e-2, 1e-2, 3
 # Joints at which freedoms are held have independent coordinates, to this singular value.
 _INDEPENDENT = 1e-6
 _PARALLEL = "the drives {} cannot hold it: parallel singular position (type II)"
@@ -70,12 +66,18 @@ class Moved(NamedTuple):
 
 @dataclass
 class _Drag:
-    """One drag: its algebra, the target before, and poses that it has passed."""
+    """One drag: its body and algebra, the target before, and poses that it has passed."""
 
+    body: str
     dragging: Dragging
     target: Array
     determined: bool
     passed: list[tuple[Array, Array]]
+
+
+def _loops_of(mechanism: Mechanism) -> LoopClosure:
+    """Return the closure of the rigid mechanism without prescribed motions."""
+    return LoopClosure(replace(with_any_masses(mechanism).rigid(), prescribed=()), 0.0, None, NO_TASKS)
 
 
 class Mover:
@@ -116,9 +118,7 @@ class Mover:
         self.to_assembly(assembly)
 
     def _take(self, mechanism: Mechanism) -> None:
-        self.mechanism = mechanism
-        self._rigid = replace(with_any_masses(mechanism).rigid(), prescribed=())
-        self.loops = LoopClosure(self._rigid, 0.0, None, NO_TASKS)
+        self.mechanism, self.loops = mechanism, _loops_of(mechanism)
         self.system = self.loops.system
 
     def to_assembly(self, name: str | None = None) -> Array:
@@ -134,7 +134,8 @@ class Mover:
         found = mobility(self.system, State(0.0, self.q, np.zeros(self.system.n)))
         self.freedoms = found.nearby_freedoms or found.freedoms
         self._branches = Branches(self.system, self.freedoms, self.q)
-        self._signs: dict[tuple[str, str], Guard] = {}
+        self._signs: dict[str, Guard] = {}
+        self._own = "", Guard(lambda q: 0.0, "")
         self._drag: _Drag | None = None
         return self.q
 
@@ -148,27 +149,21 @@ class Mover:
         InputError, AssemblyError
             The loops close neither from the present pose nor in the assembly; the mover keeps its mechanism.
         """
-        found = Mover(mechanism) if mechanism.assemblies else None
-        new = object.__new__(Mover) if found is None else found
-        if found is None:
-            new._take(mechanism)
-        guess = self._guess_for(new)
-        pose, phi = assemble(new.system, new.loops.signals, 0.0, guess, lambda q: constraint_change(new.system, q))
-        kept = closed(new.system, pose, phi)
-        if not kept and found is None:
-            new.to_assembly()
-        self._take(mechanism)
-        self.loops, self.system = new.loops, new.system
-        self.at(pose if kept else new.q)
-        return kept
-
-    def _guess_for(self, new: "Mover") -> Array:
-        """Return the present pose in the coordinates of another mechanism."""
-        guess = new.q.copy() if hasattr(new, "q") else np.zeros(new.system.n)
-        for body in new.system.bodies:
+        loops = _loops_of(mechanism)
+        system, guess = loops.system, np.zeros(loops.system.n)
+        if any(body.name not in self.system.index for body in system.bodies):
+            guess = reference_pose(system, mechanism.assembly(None))
+        for body in system.bodies:
             if body.name in self.system.index:
                 guess[body.all] = self.q[self.system.body(body.name).all]
-        return guess
+        change = partial(constraint_change, system)
+        pose, phi = assemble(system, loops.signals, 0.0, guess, change, longest=_LONGEST)
+        kept = closed(system, pose, phi)
+        if not kept:
+            pose = loops.assembled(mechanism.assembly(None))
+        self.mechanism, self.loops, self.system = mechanism, loops, system
+        self.at(pose)
+        return kept
 
     def angles(self) -> dict[str, float]:
         """Return the angles of all bodies at the present pose [rad]."""
@@ -176,7 +171,7 @@ class Mover:
 
     def places(self) -> dict[str, tuple[float, float]]:
         """Return the positions of all named points of bodies, by "body.point" [m]."""
-        refs = [PointRef(body.name, point) for body in self._rigid.bodies for point in body.points]
+        refs = [PointRef(body.name, point) for body in self.loops.mechanism.bodies for point in body.points]
         found = {str(ref): marker_position(self.system, self.system.marker(ref), self.q) for ref in refs}
         return {name: (float(x), float(y)) for name, (x, y) in found.items()}
 
@@ -231,9 +226,9 @@ class Mover:
 
     def _dragged(self, body: str, local: Iterable[float] | str) -> _Drag:
         """Return the drag of a point: the present one, or a new one."""
-        known(body, [one.name for one in self._rigid.bodies], "body", "body")
+        known(body, [one.name for one in self.loops.mechanism.bodies], "body", "body")
         if isinstance(local, str):
-            places = local_points(self._rigid.body(body))
+            places = local_points(self.loops.mechanism.body(body))
             known(local, [*places], f"body.{body}", "point")
             local = places[local]
         at, point = self.system.body(body).offset, np.array([*local], dtype=float)
@@ -241,36 +236,41 @@ class Mover:
         if old is not None and old.dragging.at == at and np.array_equal(old.dragging.local, point):
             return old
         drag = Dragging(self.system, self.loops.signals, self.freedoms, at, point, [])
-        determined = self.freedoms == 2 and self._guide(body) is None
-        drag.guards.extend(self._guards(body, drag, determined=determined))
+        place, guide = drag.place(self.q), self._guide(body)
+        determined = self.freedoms == 2 and guide is None
+        if guide is not None and self.freedoms == 1:
+            drag.guards.append(self._limit(f"{body} {guide.name}", self._branches.joint_rows([guide.name])))
+        elif determined:
+            limit = self._limit(f"{body} {point}", drag.rows)
+            # A point that two freedoms move along a line is not determined by its place.
+            determined = bool(limit.sign) or abs(limit.value(self.q)) > NO_SIGN
+            drag.guards.extend([limit] if determined else [])
+        drag.guards.extend(self._lasting(chains=determined))
         for guard in drag.guards:
             guard.begin(self.q)
-        place = drag.place(self.q)
-        self._drag = _Drag(drag, place, determined, [(place, self.q)])
+        self._drag = _Drag(body, drag, place, determined, [(place, self.q)])
         return self._drag
+
+    def _limit(self, name: str, rows: Callable[[Array], Array]) -> Guard:
+        """Return the guard of the limits of reach of a point, with its sign if the same body was dragged last."""
+        if self._own[0] != name:
+            self._own = name, self._branches.determinant(rows, "")
+        return self._own[1]
 
     def _guide(self, body: str) -> Joint | None:
         """Return the joint that guides a body on the ground."""
-        found = [one for one in self._rigid.joints_at[body] if one.moves and GROUND in (one.a.body, one.b.body)]
+        found = [
+            one for one in self.loops.mechanism.joints_at[body] if one.moves and GROUND in (one.a.body, one.b.body)
+        ]
         return found[0] if found else None
 
-    def _guards(self, body: str, drag: Dragging, *, determined: bool) -> list[Guard]:
-        """Return what keeps its sign as a point of a body is dragged; signs last as long as the assembly."""
-        own, guide = self._signs, self._guide(body)
-        guards = self._elbow_guards(chains=determined) if self.freedoms else []
+    def _lasting(self, *, chains: bool) -> list[Guard]:
+        """Return what keeps its sign whichever body is dragged: elbows, and the drives' determinant."""
+        found = self._branches.guarded_elbows(chains=chains) if self.freedoms else []
         if self.drives:
-            guards.append(self._drive_guard)
-        limit = f"limit of reach of {body}"
-        if self.freedoms == 1 and guide is not None:
-            rows = self._branches.joint_rows([guide.name])
-            guards.append(own.setdefault((body, guide.name), self._branches.determinant(rows, limit)))
-        elif determined:
-            guards.append(own.setdefault((body, str(drag.local)), self._branches.determinant(drag.rows, limit)))
-        return guards
-
-    def _elbow_guards(self, *, chains: bool) -> list[Guard]:
-        found = self._branches.guarded_elbows(chains=chains)
-        return [self._signs.setdefault(("", guard.text), guard) for guard in found]
+            rows = self._branches.joint_rows(self.drives)
+            found.append(self._branches.determinant(rows, _PARALLEL.format(listed(self.drives))))
+        return [self._signs.setdefault(guard.text, guard) for guard in found]
 
     @property
     def drives(self) -> list[str]:
@@ -282,13 +282,6 @@ class Mover:
                 return joints
         return []
 
-    @property
-    def _drive_guard(self) -> Guard:
-        text = _PARALLEL.format(listed(self.drives))
-        return self._signs.setdefault(
-            ("", "drives"), self._branches.determinant(self._branches.joint_rows(self.drives), text)
-        )
-
     def _stop(self, here: _Drag, q: Array, goal: Array) -> tuple[str, str]:
         """Return what holds a point back from its target, and a sentence on it."""
         drag = here.dragging
@@ -299,10 +292,10 @@ class Mover:
         if not near and not lost:
             return "", ""
         in_line = [one.text for one in self._branches.elbows if abs(np.sin(q[one.b] - q[one.a] + one.offset)) < _NAMED]
-        texts = dict.fromkeys([guard.text for guard in near] + in_line)
+        texts = dict.fromkeys([guard.text for guard in near if guard.text] + in_line)
         stop = "singular" if near and falling else "reach"
-        own = "singular position" if stop == "singular" else "limit of reach"
-        return stop, f"{own}: {listed([*texts])}" if texts else own
+        own = "singular position" if stop == "singular" else f"limit of reach of {here.body}"
+        return stop, f"{own}: {listed([*texts], _LISTED)}" if texts else own
 
     @property
     def _usual(self) -> tuple[Array, Array]:
@@ -341,17 +334,21 @@ def assemblies(mover: Mover, starts: int = 200, *, hold: str = "") -> list[Array
 def _held(mover: Mover, hold: str) -> Mechanism:
     """Return the rigid mechanism with its drives, end-effector or other joints held at the present pose."""
     rigid, effector = mover.loops.mechanism, mover.mechanism.end_effector
-    if hold == "drives" or (not hold and mover.drives):
+    at_effector = effector is not None and mover.freedoms in (2, 3)
+    if (hold == "drives" and not mover.drives) or (hold == "end-effector" and not at_effector):
+        remedy = "leave it out, and joints at the ground are held"
+        raise InputError("does not determine the pose", field="hold", value=hold, remedy=remedy)
+    if mover.drives and hold != "end-effector":
         return _with_held(mover, mover.drives)
-    if effector is not None and not effector.point.on_ground and mover.freedoms in (2, 3):
+    if effector is not None and at_effector:
         place = marker_position(mover.system, mover.system.marker(effector.point), mover.q)
-        pin = PointRef(GROUND, "held._point")
+        pin = PointRef(GROUND, "held_point")
         ground = {**rigid.ground, pin.point: (float(place[0]), float(place[1]))}
         angle = float(material_angle(mover.system, effector.point, mover.q[None])[0])
         more = (
-            RevoluteJoint("held._joint", pin, effector.point)
+            RevoluteJoint("held_joint", pin, effector.point)
             if mover.freedoms == 2
-            else WeldJoint("held._joint", pin, effector.point, angle)
+            else WeldJoint("held_joint", pin, effector.point, angle)
         )
         return replace(rigid, ground=ground, joints=(*rigid.joints, more))
     grounded = [one.name for one in rigid.joints if one.moves and GROUND in (one.a.body, one.b.body)]

@@ -118,9 +118,7 @@ def _solved(sheet: Sheet, field: str, text: str, name: str, value: float) -> flo
 
 def _with_body(sheet: Sheet, before: Sheet, body: str, point: str, to: XY, assembly: str) -> tuple[Sheet, float]:
     """Return the sheet with a point of a body elsewhere, and the angle by which the body turns [rad]."""
-    frame, table = before.frames.get(assembly, {}).get(body), before.data["body"][body]
-    if frame is None or frame.position is None:
-        raise InputError("its place is not known", field=f"body.{body}", remedy="give its angle in an assembly")
+    frame, table = before.frame(body, assembly), before.data["body"][body]
     if table.get("type") == "modal":
         raise InputError("a body of matrices has fixed points", field=f"body.{body}.points.{point}",
                          remedy="change its matrices in the text")  # fmt: skip
@@ -130,7 +128,7 @@ def _with_body(sheet: Sheet, before: Sheet, body: str, point: str, to: XY, assem
     if len(points) == 2:
         return _with_bar(sheet, body, point, points, frame, to)
     if len(points) > 2:
-        x, y = to[0] - frame.position[0], to[1] - frame.position[1]
+        x, y = to[0] - frame.origin[0], to[1] - frame.origin[1]
         c, s = cos(frame.angle), sin(frame.angle)
         sheet = _with_pair(sheet, ("body", body, "points", point), (c * x + s * y, c * y - s * x))
     return sheet, 0.0

@@ -9,8 +9,6 @@ from enum import Enum
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 import paraflex
 from paraflex.errors import InputError, printable
 from paraflex.files import ExpressionProfile, Model
@@ -38,24 +36,12 @@ def program(text: str, folder: Path | None = None, source: str = "model") -> str
         A text that is not a model, or a member that no program can hold.
     """
     model = model_of(text, folder, source)
-    mechanism = model.mechanism
-    writer = _Writer(_shared(model))
-    shared = [f"{name} = {writer.call(one)}" for one, name in writer.names.items()]
-    whole = f"mechanism = {writer.value(mechanism)}"
-    imports = [f"from {module} import {name}" for module, name in sorted(writer.imports)]
-    title = " ".join(f"{mechanism.name}. {mechanism.description}".split())
-    lines = [
-        f"# {printable(title)}",
-        "import paraflex as pf",
-        *imports,
-        "",
-        "point = pf.PointRef.parse",
-        *shared,
-        "",
-        whole,
-        "",
-    ]
-    return "\n".join(lines)
+    writer, mechanism = _Writer(_shared(model)), model.mechanism
+    shared = "".join(f"{name} = {writer.call(one)}\n" for one, name in writer.names.items())
+    whole = f"point = pf.PointRef.parse\n{shared}\nmechanism = {writer.value(mechanism)}\n"
+    imports = "".join(f"from {module} import {name}\n" for module, name in sorted(writer.imports))
+    title = printable(" ".join(f"{mechanism.name}. {mechanism.description}".split()))
+    return f"# {title}\nimport paraflex as pf\n{imports}\n{whole}"
 
 
 def _shared(model: Model) -> dict[Any, str]:
@@ -97,9 +83,8 @@ class _Writer:
         if isinstance(given, Mapping):
             pairs = [f"{self.value(key)}: {self.value(one, depth + 1)}" for key, one in given.items()]
             return _wrapped("{", pairs, "}", depth)
-        if isinstance(given, tuple | list | np.ndarray):
-            inner = [self.value(one, depth + 1) for one in given]
-            return _wrapped("(", [*inner[:-1], inner[-1] + "," * (len(inner) == 1)] if inner else [], ")", depth)
+        if isinstance(given, tuple | list):
+            return _wrapped("(", [self.value(one, depth + 1) for one in given], ",)" if len(given) == 1 else ")", depth)
         if is_dataclass(given):
             return self.call(given, depth)
         return _plain(given)
@@ -126,21 +111,14 @@ def _given(given: Any) -> Iterator[tuple[str, Any]]:
     for one in fields(given):
         value = getattr(given, one.name)
         default = one.default if one.default_factory is MISSING else one.default_factory()
-        # The body that carries a payload includes it; fields of the file are named in errors only.
-        left_out = one.name in ("payload", "cut") or (one.name == "field" and not one.compare)
-        same = default is not MISSING and type(value) is type(default) and _same(value, default)
-        if one.init and not left_out and not same:
+        # Fields of the file are named in errors only.
+        of_file = one.name == "field" and not one.compare
+        if one.init and not of_file and (default is MISSING or type(value) is not type(default) or value != default):
             yield one.name, value
-
-
-def _same(one: Any, other: Any) -> bool:
-    return bool(np.array_equal(one, other)) if isinstance(one, np.ndarray) else one == other
 
 
 def _plain(given: Any) -> str:
     """Return a number, text, truth value or None as Python writes it."""
-    if isinstance(given, np.generic):
-        given = given.item()
     if isinstance(given, float) and not math.isfinite(given):
         return f'float("{given}")'
     if isinstance(given, str):
@@ -161,6 +139,5 @@ def _wrapped(opening: str, parts: list[str], closing: str, depth: int) -> str:
     line = f"{opening}{', '.join(parts)}{closing}"
     if len(line) + 4 * depth <= _WIDTH and "\n" not in line:
         return line
-    indent = "    " * (depth + 1)
-    parts = [part.removesuffix(",") for part in parts]
-    return f"{opening}\n{''.join(f'{indent}{part},{chr(10)}' for part in parts)}{'    ' * depth}{closing}"
+    inner = "".join(f"{'    ' * (depth + 1)}{part},\n" for part in parts)
+    return f"{opening}\n{inner}{'    ' * depth}{closing[-1]}"

@@ -78,7 +78,7 @@ class Runner:
             if self._closed:
                 raise InputError("is closed", field="runner", remedy="make another Runner")
             self._on_event = on_event
-            return self._hand_over({"outside": may_be_outside(), **request})
+            return self._hand_over({**request, "outside": may_be_outside()})
 
     def cancel(self) -> None:
         """Stop the run, if there is one; its last event has the state "cancelled"."""

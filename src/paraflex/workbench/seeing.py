@@ -1,26 +1,255 @@
-"""Numbers of a pose for the page (in work)."""
+"""Numbers of a pose for the page: freedoms, singular positions, frequencies, compliance, holding torques, modes."""
 
+from collections.abc import Sequence
+from contextlib import suppress
+from dataclasses import replace
+from functools import cached_property
 from typing import Any
+
+import numpy as np
+
+from paraflex.actuation import actuation_condition, required_effort
+from paraflex.arrays import Array, ArrayLike, Mask
+from paraflex.dynamics import System, build_system, natural_frequencies, undeformed
+from paraflex.dynamics.joint_coordinates import joint_rows
+from paraflex.dynamics.linearise import LOWEST, compliance
+from paraflex.dynamics.points import marker_place
+from paraflex.dynamics.state import State
+from paraflex.dynamics.stiffness import RestingForces
+from paraflex.errors import InputError, NumericalError, ParaflexError
+from paraflex.files import Model
+from paraflex.mechanism import Mechanism
+from paraflex.paths import Path
+from paraflex.paths.closure import PathClosure, RigidMotion, follow_path
+
+# Singular values below this fraction of the largest count as zero; frequencies that are shown.
+_DEPENDENT, _SHOWN = 1e-9, 3
+# Ratio of singular values below which a position counts as near a singular one, and numbers of places of a path
+# that is followed, and of one that leaves the reach.
+NEAR, _PLACES, _SEARCHED = 0.05, 120, 40
+_NOT, _NEAR, _WELL = 0, 2, 1
 
 
 class Seeing:
-    """Numbers of a pose."""
+    """Numbers of the poses of one model; what does not depend on the pose is computed once.
 
-    def __init__(self, model: Any, mover: Any) -> None:
-        self.model, self.mover = model, mover
+    Parameters
+    ----------
+    model : Model
+        Model; bodies may lack masses.
+    before : Seeing, optional
+        Numbers of the model before a change, whose bodies are reused where they did not change.
+    """
 
-    def quick(self, q: Any, mode: str) -> dict[str, Any]:
-        """Return the numbers that are computed fast."""
-        return {}
+    def __init__(self, model: Model, before: "Seeing | None" = None) -> None:
+        self._model = model
+        self._like: System | None = None if before is None else vars(before).get("_flexible")
+        # Prescribed motions are motors that hold their joints at any pose.
+        self._mechanism: Mechanism = replace(model.mechanism, prescribed=())
+        self._drives = [one.joint for one in model.mechanism.prescribed]
+        self._joint = {motor.name: motor.joint for motor in self._mechanism.motors}
+        self._paths: dict[tuple[str, str], list[list[float]]] = {}
 
-    full = quick
+    @cached_property
+    def _rigid(self) -> System:
+        return build_system(self._mechanism.rigid())
+
+    @cached_property
+    def _flexible(self) -> System:
+        return build_system(self._mechanism, like=self._like)
+
+    @cached_property
+    def massless(self) -> str:
+        """Reason why nothing that depends on masses is known; empty if it is known."""
+        try:
+            _ = self._rigid
+        except InputError as error:
+            return f"{error.field} {error.problem.partition(',')[0]}"
+        return ""
+
+    def quick(self, q: Array, mode: str) -> dict[str, Any]:
+        """Return the numbers of a rigid pose (n,) that follow a drag.
+
+        The dict has `freedoms`; `mode`; `drives`, how many freedoms the motors of the mode drive; `condition` of the
+        effort in the task by these motors (`actuation.actuation_condition`); `serial` and `parallel`, ratios of the
+        smallest to the largest singular value of the velocities of the end-effector and of the motors, by all motions
+        of unit length, zero in singular positions of types I and II; `torques`, those of least norm that hold gravity,
+        springs and loads at rest [N m, N]; and `why`, reasons for those that are None.
+        """
+        why: dict[str, str] = {}
+        if self.massless:
+            return {"freedoms": None, "mode": mode, "why": {"freedoms": "", "torques": self.massless}}
+        motors, free = self._motors(mode), self._free(q)
+        by_motors, by_task = self._moved(q, motors, free)
+        found = {"freedoms": free.shape[1], "mode": mode, "drives": int(_rank(by_motors))}
+        found |= self._singular(q, motors) | {"condition": _condition(by_task, by_motors)}
+        found["torques"] = self._holding(q, free, by_motors, [*motors, *self._drives], why)
+        return {**found, "why": why}
+
+    def _moved(self, q: Array, motors: Sequence[str], free: Array) -> tuple[Array, Array | None]:
+        """Return the velocities of motors and drives, and of the task, by the free motions."""
+        joints = [*(self._joint[name] for name in motors), *self._drives]
+        by_task = self._task(self._rigid, q)
+        by_motors = self._scaled(joint_rows(self._rigid, joints, q)) @ free
+        return by_motors, None if by_task is None else self._scaled(by_task) @ free
+
+    def _singular(self, q: Array, motors: Sequence[str]) -> dict[str, float | None]:
+        """Return the distances from singular positions of types II, parallel, and I, serial; see `quick`."""
+        free = self._free(q)
+        by_motors, by_task = self._moved(q, motors, free)
+        count = free.shape[1]
+        return {
+            "parallel": _ratio(by_motors, count) if len(by_motors) and count else None,
+            "serial": _ratio(by_task, count) if by_task is not None and count else None,
+        }
+
+    def full(self, q: Array, mode: str) -> dict[str, Any]:
+        """Return all numbers of a rigid pose (n,): those of `quick`, frequencies, compliance, chips and the path.
+
+        `held` and `unheld` are the lowest natural frequencies with all motors held, and free [Hz]; `compliance` of the
+        end-effector with motors held has semi-axes `sizes` [m/N] and the direction `angle` of the larger [rad];
+        `chips` have name, motors, number of freedoms driven, and what is lacking; `path` has places of the study's path
+        as [x, y, reach]: 0 out of reach, 1 reached, 2 near a singular position.
+        """
+        found = self.quick(q, mode)
+        why, massless = found["why"], self.massless
+        found |= {"held": None, "unheld": None, "compliance": None, "chips": self._chips(q), "path": self._path(mode)}
+        if massless:
+            return {**found, "why": {**why, "held": massless, "compliance": massless}}
+        try:
+            state = undeformed(self._flexible, self._rigid, State(0.0, q, np.zeros(self._rigid.n)))
+            held = list(dict.fromkeys([*self._joint.values(), *self._drives]))
+            found["held"] = self._frequencies(state, held, []) if held else None
+            motors = [one for one in held if one not in self._drives]
+            found["unheld"] = self._frequencies(state, self._drives, motors) if motors or not held else None
+            found["compliance"] = self._compliance(q, state, held, why)
+        except (InputError, NumericalError) as error:
+            why["held"] = str(error)
+        return found
+
+    def _frequencies(self, state: State, held: Sequence[str], torque_at: Sequence[str]) -> list[float]:
+        found = natural_frequencies(self._flexible, state, held, torque_at=torque_at, count=LOWEST)
+        return [float(omega) / (2.0 * np.pi) for omega in found.frequencies if omega > 0.0][:_SHOWN]
+
+    def _compliance(self, q: Array, state: State, held: list[str], why: dict[str, str]) -> dict[str, Any] | None:
+        rows = self._task(self._flexible, state.q, place=True)
+        if rows is None or not self._flexible.n_flexible:
+            why["compliance"] = "no end-effector" if rows is None else "no flexible link"
+            return None
+        free = self._free(q)
+        if _rank(self._scaled(joint_rows(self._rigid, held, q)) @ free) < free.shape[1]:
+            why["compliance"] = "the motors do not hold the mechanism"
+            return None
+        found = compliance(self._flexible, state, held, rows)
+        sizes, axes = np.linalg.eigh(0.5 * (found + found.T))
+        return {"sizes": [float(sizes[1]), float(sizes[0])], "angle": float(np.arctan2(axes[1, 1], axes[0, 1]))}
+
+    def _motors(self, mode: str) -> tuple[str, ...]:
+        chosen = [one.motors for one in self._mechanism.modes if one.name == mode]
+        return chosen[0] if chosen else tuple(motor.name for motor in self._mechanism.motors)
+
+    def _free(self, q: Array) -> Array:
+        """Return a basis (n, freedoms) of the motions that the joints allow, dimensionless and of unit length."""
+        jacobian = self._rigid.dimensionless_jacobian(q)
+        if not jacobian.size:
+            return np.eye(self._rigid.n)
+        _, sizes, right = np.linalg.svd(jacobian)
+        return right[int(np.sum(sizes > _DEPENDENT * np.max(sizes, initial=0.0))) :].T
+
+    def _scaled(self, rows: Array) -> Array:
+        return rows * self._rigid.units
+
+    def _task(self, system: System, q: Array, *, place: bool = False) -> Array | None:
+        """Return the derivatives of the task coordinates, or of x and y; None without an end-effector."""
+        effector = self._mechanism.end_effector
+        if effector is None:
+            return None
+        rows = marker_place(system, system.marker(effector.point), q[None])[1][0]
+        if place:
+            return rows
+        turn = np.zeros((1, system.n))
+        if not effector.point.on_ground:
+            turn[0, system.body(effector.point.body).angle] = system.size
+        return np.vstack([rows, turn])[[("x", "y", "angle").index(one) for one in effector.coordinates]]
+
+    def _holding(
+        self, q: Array, free: Array, by_motors: Array, names: list[str], why: dict[str, str]
+    ) -> dict[str, float] | None:
+        system, lam = self._rigid, np.zeros(self._rigid.m)
+        forces = RestingForces(system, 0.0)
+        lam[forces.springs] = forces(q, lam)[1] / system.packed.rows["compliance"][forces.springs]
+        needed = free.T @ (system.units * forces(q, lam)[0])
+        torques = np.linalg.pinv(by_motors.T) @ needed
+        left = float(np.max(np.abs(by_motors.T @ torques - needed), initial=0.0))
+        if left > 1e-9 * max(1.0, float(np.max(np.abs(needed), initial=0.0))):
+            why["torques"] = "the motors cannot hold the mechanism at rest here"
+            return None
+        return {name: float(torque) for name, torque in zip(names, torques, strict=True)}
+
+    def _chips(self, q: Array) -> list[dict[str, Any]]:
+        """Return the modes with what their motors drive at a pose."""
+        if self.massless or not self._mechanism.modes:
+            return []
+        free, out = self._free(q), []
+        for mode in self._mechanism.modes:
+            joints = [self._joint[name] for name in mode.motors]
+            driven, freedoms = _rank(self._scaled(joint_rows(self._rigid, joints, q)) @ free), free.shape[1]
+            lacks = f"drives {driven} of {freedoms} degrees of freedom" if driven < freedoms else ""
+            out.append({"name": mode.name, "motors": list(mode.motors), "drives": driven, "lacks": lacks})
+        return out
+
+    def _path(self, mode: str) -> list[list[float]]:
+        """Return the places of the study's path and whether they are reached; empty if it cannot be tried."""
+        if self._mechanism.end_effector is None or not self._model.paths:
+            return []
+        name = self._model.path_name()
+        if (name, mode) not in self._paths:
+            self._paths[name, mode] = []
+            with suppress(ParaflexError):
+                self._paths[name, mode] = self._reached(self._model.path(name), mode)
+        return self._paths[name, mode]
+
+    def _reached(self, path: Path, mode: str) -> list[list[float]]:
+        assembly = self._model.mechanism.assembly(self._model.study.assembly)
+        orientation = self._model.study.orientation or 0.0
+        with suppress(ParaflexError):
+            times = np.linspace(0.0, path.duration, _PLACES)
+            motion = follow_path(self._model.mechanism, path, times, assembly=assembly, orientation=orientation)
+            return _places(path, times, np.where(self._near(motion, mode), _NEAR, _WELL))
+        closure = PathClosure(self._model.mechanism.rigid(), orientation, path.duration)
+        times = np.linspace(0.0, path.duration, _SEARCHED)
+        found = closure.reach.tracked(times, closure.target(path, times)[:, 0], closure.assembled(assembly))
+        return _places(path, times, [_NOT if one.part else _WELL for one in found])
+
+    def _near(self, motion: RigidMotion, mode: str) -> Mask:
+        """Return where the motors of a mode are near a singular position along a motion (k,)."""
+        chosen = next((one for one in self._model.mechanism.modes if one.name == mode), None)
+        if chosen is None or self.massless:
+            return np.zeros(motion.t.size, dtype=bool)
+        return actuation_condition(required_effort(motion), chosen) > 1.0 / NEAR
 
 
-def readiness(text: str, model: Any = None, problem: Any = None) -> dict[str, Any]:
-    """Return what stands in the way of a run."""
-    return {
-        "ok": problem is None and model is not None,
-        "sentence": str(problem or "Draw a link"),
-        "place": [],
-        "action": "",
-    }
+def _places(path: Path, times: Array, reach: ArrayLike) -> list[list[float]]:
+    return np.column_stack([path.evaluate(times).position, reach]).tolist()
+
+
+def _rank(rows: Array) -> int:
+    """Return the rank of rows by motions of unit length."""
+    return int(np.sum(np.linalg.svd(rows, compute_uv=False) > 1e-7)) if rows.size else 0
+
+
+def _ratio(rows: Array, freedoms: int) -> float:
+    """Return the ratio of singular values, the one of number `freedoms` to the largest; zero if there are fewer."""
+    sizes = np.linalg.svd(rows, compute_uv=False)
+    return float(sizes[freedoms - 1] / sizes[0]) if sizes.size >= freedoms and sizes[0] > 0.0 else 0.0
+
+
+def _condition(by_task: Array | None, by_motors: Array) -> float | None:
+    """Return the condition number of the effort in the task per torque; None without a task that fits the freedoms."""
+    if by_task is None or by_task.shape[0] != by_task.shape[1] or not by_motors.size:
+        return None
+    if np.linalg.matrix_rank(by_task) < by_task.shape[0]:
+        return None
+    sizes = np.linalg.svd(np.linalg.solve(by_task.T, by_motors.T), compute_uv=False)
+    freedoms = by_task.shape[0]
+    return float(sizes[0] / sizes[freedoms - 1]) if sizes.size >= freedoms and sizes[freedoms - 1] > 0.0 else None

@@ -207,7 +207,7 @@ class Session:
             return self._address(report(text, folder, place, source=source))
         if out == "film":
             return self._address(film(text, folder, place / f"{source}.gif", source=source))
-        return self._address(figures(text, folder, place / f"{source}.{out}", source=source)[0])
+        return self._address(figures(text, folder, place / source, source=source, kinds=[out])[0])
 
     def _out(self) -> Path:
         if self._folder is None:

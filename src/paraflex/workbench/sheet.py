@@ -22,6 +22,18 @@ from .spans import data_of
 
 XY = tuple[float, float]
 Action = Mapping[str, Any]
+
+
+class Frame(Pose):
+    """Pose of a body whose position is known."""
+
+    @property
+    def origin(self) -> XY:
+        """Position of the frame's origin [m]."""
+        assert self.position is not None
+        return self.position
+
+
 # Stands in for the bodies of a sheet without any, so that the rest of the file is read and checked.
 _NO_BODY = {"body": {"none": {"type": "rigid", "points": {"none": [0.0, 0.0]}}}}
 
@@ -109,10 +121,18 @@ class Sheet:
         body, _, point = ref.partition(".")
         if body == GROUND and point in self.names("ground"):
             return self.number(("ground", point, 0)), self.number(("ground", point, 1))
-        frame = self.frames.get(assembly, {}).get(body)
-        if frame is None or frame.position is None or point not in self.locals[body]:
+        if point not in self.locals.get(body, {}):
             raise self.unknown_point(ref)
-        return frame.place_of(self.locals[body][point])
+        return self.frame(body, assembly).place_of(self.locals[body][point])
+
+    def frame(self, body: str, assembly: str) -> "Frame":
+        """Return the pose of a body in an assembly; an error if it is not known."""
+        found = self.frames.get(assembly, {}).get(body)
+        if found is None or found.position is None:
+            raise self.problem or InputError(
+                "its place is not known", field=f"body.{body}", remedy="give its angle in an assembly"
+            )
+        return Frame(found.angle, found.position)
 
     def unknown_point(self, ref: str) -> InputError:
         """Return the error for a point that does not exist, or has no known place."""

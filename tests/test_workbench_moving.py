@@ -1,0 +1,294 @@
+"""Drags of mechanisms by hand: they follow the target, stop at limits, and stay in their assembly."""
+
+import json
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import paraflex as pf
+from paraflex.errors import InputError
+from paraflex.figures.kinematics import kinematics_of
+from paraflex.results import motion_dataset
+from paraflex.workbench.moving import Mover, assemblies
+from paraflex.workbench.turning import turning
+
+
+def mover_of(name, assembly=None):
+    return Mover(pf.load(name).mechanism, assembly)
+
+
+def link(name, length, *more):
+    return pf.RigidBody(name, points={"a": (0.0, 0.0), "b": (length, 0.0), **dict(more)})
+
+
+def chain(*lengths, angles):
+    """Return a chain of massless links from the origin."""
+    bodies = tuple(link(f"l{k}", length) for k, length in enumerate(lengths))
+    points = ["ground.O", *(f"l{k}.b" for k in range(len(lengths)))]
+    joints = tuple(pf.RevoluteJoint(f"j{k}", points[k], f"l{k}.a") for k in range(len(lengths)))
+    given = {f"l{k}": angle for k, angle in enumerate(angles)}
+    return pf.Mechanism("chain", bodies=bodies, joints=joints, ground={"O": (0.0, 0.0)}, assemblies=(pf.Assembly("drawn", given),))
+
+
+def four_bar(crank, coupler, rocker, base, angles):
+    bodies = (link("crank", crank), link("coupler", coupler), link("rocker", rocker))
+    joints = (
+        pf.RevoluteJoint("O", "ground.O", "crank.a"),
+        pf.RevoluteJoint("A", "crank.b", "coupler.a"),
+        pf.RevoluteJoint("B", "coupler.b", "rocker.b"),
+        pf.RevoluteJoint("Q", "ground.Q", "rocker.a"),
+    )
+    given = dict(zip(("crank", "coupler", "rocker"), angles, strict=True))
+    return pf.Mechanism(
+        "four-bar", bodies=bodies, joints=joints, ground={"O": (0.0, 0.0), "Q": (base, 0.0)},
+        assemblies=(pf.Assembly("drawn", given),),
+    )  # fmt: skip
+
+
+def place(mover, ref):
+    return np.array(mover.places()[ref])
+
+
+def gap(mover):
+    return mover.system.gap(mover.system.constraints(mover.loops.signals, 0.0, mover.q)[0])
+
+
+def sines(mover):
+    """Return the sines of the elbows of the mechanism, computed from its angles."""
+    return np.array([math.sin(mover.q[one.b] - mover.q[one.a] + one.offset) for one in mover._branches.elbows])
+
+
+def turned(a, b, system):
+    """Return the distance of two poses, whole turns apart or not."""
+    off = (a - b) / system.units
+    angles = [body.angle for body in system.bodies]
+    off[angles] = (off[angles] + np.pi) % (2.0 * np.pi) - np.pi
+    return np.max(np.abs(off))
+
+
+@pytest.mark.parametrize("bend", [0.8, -0.8])
+def test_two_links_follow_to_their_limits_and_keep_their_elbow(bend):
+    mover = Mover(chain(1.0, 0.4, angles=(0.3, 0.3 + bend)))
+    for r, angle in [(1.0, 1.0), (0.7, -2.0), (1.39, 3.0), (0.61, 0.0)]:
+        target = r * np.array([math.cos(angle), math.sin(angle)])
+        moved = mover.drag("l1", "b", target)
+        assert moved.reached
+        assert moved.stop == ""
+        assert np.hypot(*(place(mover, "l1.b") - target)) < 1e-8
+        assert math.sin(mover.angles()["l1"] - mover.angles()["l0"]) * bend > 0.0
+    for far, limit in [(3.0, 1.4), (0.1, 0.6), (50.0, 1.4)]:
+        for angle in np.linspace(0.0, 2.0 * np.pi, 9):
+            moved = mover.drag("l1", (0.4, 0.0), (far * math.cos(angle), far * math.sin(angle)))
+            assert (moved.reached, moved.stop) == (False, "reach")
+            assert "l0 and l1 in line" in moved.problem
+            assert math.isclose(np.hypot(*place(mover, "l1.b")), limit, rel_tol=1e-6)
+            assert math.sin(mover.angles()["l1"] - mover.angles()["l0"]) * bend > 0.0
+
+
+def test_a_straight_chain_bends():
+    mover = Mover(chain(1.0, 1.0, angles=(0.0, 0.0)))
+    assert mover.drag("l1", "b", (1.5, 0.0)).reached
+    assert np.allclose(place(mover, "l1.b"), [1.5, 0.0], atol=1e-8)
+
+
+def test_a_chain_with_more_freedoms_moves_least():
+    mover = Mover(chain(1.0, 1.0, 1.0, angles=(0.2, 0.9, 1.4)))
+    start = mover.q.copy()
+    target = place(mover, "l2.b") + [0.01, -0.02]
+    assert mover.drag("l2", "b", target).reached
+    assert turned(mover.q, start, mover.system) < 0.1
+    moved = mover.drag("l2", "b", (9.0, 0.0))
+    assert moved.stop == "reach"
+    assert math.isclose(np.hypot(*place(mover, "l2.b")), 3.0, rel_tol=1e-6)
+
+
+def test_a_five_bar_stops_at_its_boundary():
+    mover = mover_of("five_bar", "outward")
+    # Both legs of 0.25 + 0.25 m are stretched above the middle, one of them at the side.
+    for target, expected in [((0.0, 2.0), (0.0, math.sqrt(0.24))), ((2.0, 0.0), (0.4, 0.0))]:
+        moved = mover.drag("distal1", "C", target)
+        assert (moved.reached, moved.stop) == (False, "reach")
+        assert np.allclose(place(mover, "distal1.C"), expected, atol=1e-6)
+
+
+def test_a_five_bar_stays_in_its_assembly_by_any_body():
+    for assembly in ("outward", "inward", "left", "right"):
+        mover = mover_of("five_bar", assembly)
+        start, signs, random = mover.q.copy(), np.sign(sines(mover)), np.random.default_rng(5)
+        home = place(mover, "distal1.C")
+        for body in ("distal1", "proximal1", "distal2", "proximal2"):
+            for _ in range(12):
+                mover.drag(body, (0.25, 0.0), random.normal(scale=0.5, size=2))
+                assert np.array_equal(np.sign(sines(mover)), signs)
+                assert gap(mover) < 1e-9
+        mover.at(start)
+        mover.drag("distal1", "C", home)
+        for _ in range(12):
+            mover.drag("distal1", "C", random.normal(scale=0.5, size=2))
+        assert mover.drag("distal1", "C", home).reached
+        assert turned(mover.q, start, mover.system) < 1e-6
+
+
+def test_a_five_bar_stops_at_parallel_singular_positions():
+    mover = mover_of("five_bar", "outward")
+    moved = mover.drag("distal1", "C", (0.0, 0.0))
+    assert (moved.reached, moved.stop) == (False, "singular")
+    assert "distal1 and distal2 in line" in moved.problem
+
+
+def test_a_crank_turns_through_the_dead_points_of_its_rocker():
+    mover = Mover(four_bar(1.0, 3.0, 2.5, 3.5, (1.0, 0.5, 1.8)))
+    last = mover.angles()["crank"]
+    for angle in np.linspace(1.0, 1.0 + 4.0 * np.pi, 81):
+        moved = mover.drag("crank", "b", (math.cos(angle), math.sin(angle)))
+        assert moved.reached
+        assert moved.stop == ""
+        assert gap(mover) < 1e-9
+    assert math.isclose(mover.angles()["crank"] - last, 4.0 * np.pi, abs_tol=1e-7)
+
+
+def test_a_rocker_stops_where_crank_and_coupler_are_in_line():
+    mover = Mover(four_bar(1.0, 3.0, 2.5, 3.5, (1.0, 0.5, 1.8)))
+    side = math.copysign(1.0, math.sin(mover.angles()["coupler"] - mover.angles()["crank"]))
+    for reach, beyond in [(4.0, 0.3), (2.0, 2.9), (4.0, 0.3)]:
+        target = np.array([3.5, 0.0]) + 2.5 * np.array([math.cos(beyond), math.sin(beyond)])
+        moved = mover.drag("rocker", "b", target)
+        assert (moved.reached, moved.stop) == (False, "reach")
+        assert "crank and coupler in line" in moved.problem
+        # Distance of the pins of crank and rocker, from the ground pivot of the crank.
+        assert math.isclose(np.hypot(*place(mover, "rocker.b")), reach, rel_tol=1e-6)
+        assert side * math.sin(mover.angles()["coupler"] - mover.angles()["crank"]) > 0.0
+
+
+def test_another_side_is_reached_by_the_crank_and_kept_by_the_rocker():
+    mover = Mover(four_bar(1.0, 3.0, 2.5, 3.5, (1.0, 0.5, 1.8)))
+    mover.drag("rocker", "b", (9.0, 1.0))
+    mover.release()
+    for angle in np.linspace(mover.angles()["crank"], mover.angles()["crank"] - 2.0, 9):
+        mover.drag("crank", "b", (math.cos(angle), math.sin(angle)))
+    side = math.copysign(1.0, math.sin(mover.angles()["coupler"] - mover.angles()["crank"]))
+    place_before = place(mover, "rocker.b")
+    mover.drag("rocker", "b", (9.0, 1.0))
+    assert side * math.sin(mover.angles()["coupler"] - mover.angles()["crank"]) > 0.0
+    assert mover.drag("rocker", "b", place_before).reached
+
+
+def test_a_slider_stops_at_its_dead_centres():
+    mover = mover_of("slider_crank")
+    crank, rod = (mover.mechanism.body(name) for name in ("crank", "rod"))
+    r, l = (max(x for x, _ in body.points.values()) for body in (crank, rod))
+    slider = next(body.name for body in mover.mechanism.bodies if body.name not in ("crank", "rod"))
+    moved = mover.drag(slider, (0.0, 0.0), (9.0, 0.0))
+    assert moved.stop == "reach"
+    at = mover.q[mover.system.body(slider).position]
+    assert math.isclose(at[0], r + l, rel_tol=1e-6)
+
+
+def test_prescribed_motions_are_released():
+    mover = mover_of("four_bar")
+    assert mover.mechanism.prescribed
+    before = mover.angles()["crank"]
+    r = np.hypot(*(place(mover, "crank.A") - place(mover, "crank.O")))
+    target = place(mover, "crank.O") + r * np.array([math.cos(before + 2.0), math.sin(before + 2.0)])
+    assert mover.drag("crank", "A", target).reached
+    assert math.isclose(mover.angles()["crank"], before + 2.0, abs_tol=1e-7)
+
+
+@pytest.mark.parametrize("name", [name for name in pf.library.names() if name != "raparm_ii"])
+def test_loops_stay_closed_and_branches_are_kept_along_random_paths(name):
+    mover, random = mover_of(name), np.random.default_rng(3)
+    start, size = mover.q.copy(), mover.system.size
+    refs = [(body.name, point) for body in mover.mechanism.bodies for point in body.points]
+    for k in random.permutation(len(refs))[:3]:
+        body, point = refs[k]
+        mover.at(start)
+        home = place(mover, f"{body}.{point}")
+        mover.drag(body, point, home)
+        guards = [guard for guard in mover._drag.dragging.guards if guard.sign]
+        for j in range(12):
+            moved = mover.drag(body, point, home + random.normal(scale=(2.0, 0.1)[j % 2] * size, size=2))
+            assert gap(mover) < 1e-9
+            assert moved.stop in ("", "reach", "singular")
+            assert bool(moved.problem) == bool(moved.stop)
+            assert all(guard.sign * guard.value(mover.q) > 0.0 for guard in guards)
+        mover.drag(body, point, home)
+        if mover._drag.determined:
+            assert turned(mover.q, start, mover.system) < 1e-6
+
+
+def test_a_changed_length_keeps_the_pose():
+    mechanism = four_bar(1.0, 3.0, 2.5, 3.5, (1.0, 0.5, 1.8))
+    mover = Mover(mechanism)
+    mover.drag("crank", "b", (math.cos(2.5), math.sin(2.5)))
+    before = mover.angles()
+    assert mover.redraw(four_bar(1.0, 3.1, 2.5, 3.5, (1.0, 0.5, 1.8)))
+    assert all(abs(mover.angles()[name] - angle) < 0.2 for name, angle in before.items())
+    assert gap(mover) < 1e-9
+    again = Mover(replace(mechanism, assemblies=(pf.Assembly("here", mover.angles()),)))
+    assert again.freedoms == 1
+    with pytest.raises(pf.AssemblyError):
+        mover.redraw(four_bar(1.0, 9.0, 2.5, 3.5, (1.0, 0.5, 1.8)))
+    assert mover.mechanism.body("coupler").points["b"] == (3.1, 0.0)
+
+
+def test_all_assemblies_of_a_five_bar():
+    mover = mover_of("five_bar")
+    at_point, at_drives = assemblies(mover, hold="end-effector"), assemblies(mover)
+    assert (len(at_point), len(at_drives)) == (4, 2)
+    places = []
+    for q in at_point:
+        mover.at(q)
+        places.append(place(mover, "distal1.C"))
+    assert np.ptp(places, axis=0).max() < 1e-9
+    # With the drives held the end-effector is mirrored at the line of the distal links' first points.
+    mover.at(at_drives[0])
+    first, b1, b2 = (place(mover, ref) for ref in ("distal1.C", "distal1.B1", "distal2.B2"))
+    along = (b2 - b1) / np.hypot(*(b2 - b1))
+    mover.at(at_drives[1])
+    mirrored = b1 + 2.0 * along * (along @ (first - b1)) - (first - b1)
+    assert np.allclose(place(mover, "distal1.C"), mirrored, atol=1e-9)
+
+
+def test_wrong_drags_are_refused_in_one_line():
+    mover = mover_of("five_bar")
+    for arguments in (("nobody", "C", (0, 0)), ("distal1", "nowhere", (0, 0)), ("distal1", "C", (math.nan, 0))):
+        with pytest.raises(InputError):
+            mover.drag(*arguments)
+
+
+@pytest.mark.parametrize("name", ["four_bar", "slider_crank_flexible", "five_bar"])
+def test_a_turn_has_the_numbers_of_kinematics(name):
+    model = pf.load(name)
+    found, expected = turning(model), kinematics_of(motion_dataset(pf.kinematics(model)))
+    json.dumps(found, allow_nan=False)
+    assert found["features"]["transmission_angles"] == expected["transmission_angles"]
+    assert found["features"]["dead_points"] == expected["dead_points"]
+    assert found["features"]["trails"] == expected["trails"]
+    assert len(found["frames"]["samples"]) == 181
+    k = found["frames"]["samples"][40]
+    curve = {(one["of"], one["quantity"], one["part"]): one["values"] for one in found["curves"]}
+    assert len(found["over"]["values"]) == len(found["time"])
+    for one in found["trails"]:
+        assert one["path"][k] == [curve[one["of"], "position", "x"][k], curve[one["of"], "position", "y"][k]]
+    for one in expected["transmission_angles"]:
+        values = curve[one["joint"], "transmission angle", one["coupler"]]
+        assert math.isclose(min(values), one["smallest"]["value"], abs_tol=1e-3)
+        assert min(values) >= one["smallest"]["value"] - 1e-9
+    assert any(one["quantity"] == "torque" for one in found["curves"]) == (not found["loads_problem"])
+
+
+def test_a_turn_without_masses_has_no_torques():
+    sketch = replace(pf.load("four_bar"), mechanism=four_bar(1.0, 3.0, 2.5, 3.5, (1.0, 0.5, 1.8)))
+    with pytest.raises(InputError, match="drive: is missing"):
+        turning(sketch)
+    found = turning(sketch, drive="O")
+    assert found["drive"]["full_turn"]
+    assert "mass" in found["loads_problem"]
+    assert not any(one["quantity"] == "torque" for one in found["curves"])
+    # Transmission angle by the law of cosines, of the distances between the pins of crank and rocker.
+    (one,) = found["features"]["transmission_angles"]
+    angles = [math.acos((9.0 + 6.25 - d * d) / 15.0) for d in (2.5, 4.5)]
+    least = min(min(angle, np.pi - angle) for angle in angles)
+    assert math.isclose(one["smallest"]["value"], least, rel_tol=1e-7)
