@@ -272,8 +272,8 @@ export class Sheet {
     for (const [name, points, plate] of this.shown.bodies) {
       const pixels = points.filter(Boolean).map((point) => this.px(...point));
       for (let k = 1; k < pixels.length; k++) {
-        const far = toSegment([px, py], pixels[k - 1], pixels[k]);
-        if (far < least) { least = far; best = { kind: "body", name, at: this.metres(px, py) }; }
+        const [foot, far] = toSegment([px, py], pixels[k - 1], pixels[k]);
+        if (far < least) { least = far; best = { kind: "body", name, at: this.metres(px, py), foot: this.metres(...foot) }; }
       }
       if (plate && !best && inside([px, py], pixels)) best = { kind: "body", name, at: this.metres(px, py) };
     }
@@ -281,10 +281,11 @@ export class Sheet {
   }
 }
 
+// The place on a segment that is nearest to another one, and how far that is.
 function toSegment([x, y], [ax, ay], [bx, by]) {
   const dx = bx - ax, dy = by - ay, long = dx * dx + dy * dy;
   const share = long ? Math.max(0, Math.min(1, ((x - ax) * dx + (y - ay) * dy) / long)) : 0;
-  return Math.hypot(x - ax - share * dx, y - ay - share * dy);
+  return [[ax + share * dx, ay + share * dy], Math.hypot(x - ax - share * dx, y - ay - share * dy)];
 }
 
 function inside([x, y], corners) {
