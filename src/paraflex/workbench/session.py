@@ -41,8 +41,8 @@ class Session:
     """
 
     def __init__(self, document: Document, send: Callable[[Message], None]) -> None:
-        self.document = document
-        self.bench = Bench(document)
+        self.document: Document = document
+        self.bench: Bench = Bench(document)
         self._send, self._lock = send, threading.RLock()
         self._made: list[Path] = []
         self._folder: tempfile.TemporaryDirectory[str] | None = None
