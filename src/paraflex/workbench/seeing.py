@@ -67,6 +67,11 @@ class Seeing:
             return f"{error.field} {error.problem.partition(',')[0]}"
         return ""
 
+    def holds(self, q: Array) -> bool:
+        """Return whether motors and prescribed motions hold all degrees of freedom in a rigid pose (n,)."""
+        free, joints = self._free(q), [*self._joint.values(), *self._drives]
+        return _rank(self._scaled(joint_rows(self._rigid, joints, q)) @ free) == free.shape[1]
+
     def quick(self, q: Array, mode: str) -> dict[str, Any]:
         """Return the numbers of a rigid pose (n,) that follow a drag.
 
@@ -136,8 +141,7 @@ class Seeing:
         if rows is None or not self._flexible.n_flexible:
             why["compliance"] = "no end-effector" if rows is None else "no flexible link"
             return None
-        free = self._free(q)
-        if _rank(self._scaled(joint_rows(self._rigid, held, q)) @ free) < free.shape[1]:
+        if not self.holds(q):
             why["compliance"] = "the motors do not hold the mechanism"
             return None
         found = compliance(self._flexible, state, held, rows)
