@@ -55,8 +55,8 @@ def drag_force(model: Model, q: Array, ref: str, force: Sequence[float], *, buck
     dict
         `bodies` as in a picture, deflected, and `base`, the lines of the undeformed bodies, point by point; `place` of
         the deflected point [m], and its `deflection` by the force; `stiffness`, the force over the deflection along it
-        [N/m], None without a force or if nothing yields; `buckling`, the factor of the force at which the mechanism buckles, None
-        if it does not; and `findings`, a line each.
+        [N/m], None without a force or if nothing yields; `buckling`, the factor of the force at which the mechanism
+        buckles, None if it does not; and `findings`, a line each.
 
     Raises
     ------
@@ -154,8 +154,8 @@ def linear(model: Model, q: Array, mode: str) -> dict[str, Any]:
         `poles`, the slowest as [real part [1/s], imaginary part [rad/s], frequency [Hz], damping ratio], without the
         lower halves of pairs; `held`, the lowest natural frequencies with these motors held [Hz]; `unbalanced`, the
         acceleration with which the mechanism would start [m/s^2]; `input`, the name of the first motor or prescribed
-        motion, else a force at the end-effector; `frequency` [Hz]; and `responses` of the end-effector, or of the
-        motor's joint or sensors without one, as far as they respond, each with `output`, `unit`, `magnitude` [dB] and `phase` [degrees].
+        motion, else of a force at the end-effector; `frequency` [Hz]; and `responses` of the end-effector, else of the
+        motor's joint or the sensors, as far as they respond: `output`, `unit`, `magnitude` [dB] and `phase` [degrees].
 
     Raises
     ------
