@@ -10,9 +10,9 @@ import numpy as np
 
 from paraflex.actuation import actuation_condition, required_effort
 from paraflex.arrays import Array, ArrayLike, Mask
-from paraflex.dynamics import System, acting_loads, build_system, natural_frequencies, undeformed
+from paraflex.dynamics import System, acting_loads, build_system, undeformed
 from paraflex.dynamics.joint_coordinates import joint_rows
-from paraflex.dynamics.linearise import LOWEST, compliance
+from paraflex.dynamics.linearise import LOWEST, PoseMatrices, compliance, pose_matrices, vibration_about
 from paraflex.dynamics.points import marker_place
 from paraflex.dynamics.state import State
 from paraflex.dynamics.stiffness import RestingForces
@@ -125,19 +125,22 @@ class Seeing:
         try:
             state = undeformed(self._flexible, self._rigid, State(0.0, q, np.zeros(self._rigid.n)))
             held = list(dict.fromkeys([*self._joint.values(), *self._drives]))
-            found["held"] = self._frequencies(state, held, []) if held else None
-            motors = [one for one in held if one not in self._drives]
-            found["unheld"] = self._frequencies(state, self._drives, motors) if motors or not held else None
-            found["compliance"] = self._compliance(q, state, held, why)
+            at = pose_matrices(self._flexible, state, held)
+            found["held"] = self._frequencies(state, at, held) if held else None
+            free = len(held) > len(self._drives) or not held
+            found["unheld"] = self._frequencies(state, at, self._drives) if free else None
+            found["compliance"] = self._compliance(q, state, at, held, why)
         except (InputError, NumericalError) as error:
             why["held"] = str(error)
         return found
 
-    def _frequencies(self, state: State, held: Sequence[str], torque_at: Sequence[str]) -> list[float]:
-        found = natural_frequencies(self._flexible, state, held, torque_at=torque_at, count=LOWEST)
+    def _frequencies(self, state: State, at: PoseMatrices, held: Sequence[str]) -> list[float]:
+        found = vibration_about(self._flexible, state, at, held, count=LOWEST)
         return [float(omega) / (2.0 * np.pi) for omega in found.frequencies if omega > 0.0][:_SHOWN]
 
-    def _compliance(self, q: Array, state: State, held: list[str], why: dict[str, str]) -> dict[str, Any] | None:
+    def _compliance(
+        self, q: Array, state: State, at: PoseMatrices, held: list[str], why: dict[str, str]
+    ) -> dict[str, Any] | None:
         rows = self._task(self._flexible, state.q, place=True)
         if rows is None or not self._flexible.n_flexible:
             why["compliance"] = "no end-effector" if rows is None else "no flexible link"
@@ -145,7 +148,7 @@ class Seeing:
         if not self.holds(q):
             why["compliance"] = "the motors do not hold the mechanism"
             return None
-        found = compliance(self._flexible, state, held, rows)
+        found = compliance(self._flexible, state, at, held, rows)
         sizes, axes = np.linalg.eigh(0.5 * (found + found.T))
         return {"sizes": [float(sizes[1]), float(sizes[0])], "angle": float(np.arctan2(axes[1, 1], axes[0, 1]) % np.pi)}
 
