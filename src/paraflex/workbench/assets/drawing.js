@@ -16,6 +16,7 @@ export class Drawing {
     else if (dragged && !this.begun.length && ["link", "beam", "path", "spring", "damper", "revolute", "weld", "gear", "plate"].includes(name)) {
       this.clicked(held.start, event, true);
       this.clicked(end, event, true);
+      if (name === "path") this.finish();
     } else this.clicked(end, event);
   }
 
