@@ -59,7 +59,7 @@ class Host:
         # One thread for all messages: they are answered in their order.
         self._worker = ThreadPoolExecutor(1, thread_name_prefix="workbench")
         self._slow = ThreadPoolExecutor(1, thread_name_prefix="workbench-slow")
-        self.session = Session(document, self._send)
+        self.session: Session = Session(document, self._send)
         self._server = uvicorn.Server(uvicorn.Config(self._app(), **_SERVING))
 
     @property

@@ -41,8 +41,8 @@ class Session:
     """
 
     def __init__(self, document: Document, send: Callable[[Message], None]) -> None:
-        self.document = document
-        self.bench = Bench(document)
+        self.document: Document = document
+        self.bench: Bench = Bench(document)
         self._send, self._lock = send, threading.RLock()
         self._made: list[Path] = []
         self._folder: tempfile.TemporaryDirectory[str] | None = None
@@ -197,12 +197,12 @@ class Session:
         return {}
 
     def _do_force(self, message: Message) -> Message:
-        return drag_force(
-            self.bench.known_model, self.bench.mover.q, field(message, "ref", str), numbers(message, "force", 2)
-        )
+        ref, force = field(message, "ref", str), numbers(message, "force", 2) if message.get("force") else []
+        model, q = self.bench.known_model, self.bench.mover.q
+        return drag_force(model, q, ref, force, buckling=message.get("buckling") is not False)
 
     def _do_linear(self, _: Message) -> Message:
-        return linear(self.bench.known_model, self.bench.mode)
+        return linear(self.bench.known_model, self.bench.mover.q, self.bench.mode)
 
     # What a person takes away.
 
