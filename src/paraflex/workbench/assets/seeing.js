@@ -19,7 +19,7 @@ export class Seeing {
     for (const what of ["state", "picture"]) bench.on(what, () => this.show());
     bench.on("picture", () => this.follow());
     this.sheet.under.push((pen) => this.paintUnder(pen));
-    this.sheet.over.push((pen) => this.paintLegend(pen));
+    this.sheet.over.push((pen) => this.paintOver(pen));
   }
 
   // Whether only what is computed fast belongs to the pose that is seen.
@@ -148,9 +148,15 @@ export class Seeing {
     pen.setLineDash([]);
   }
 
+  paintOver(pen) {
+    if (!this.isPosed) return;
+    if (this.bench.state.seen?.compliance) this.paintSize(pen, this.bench.state.seen.compliance);
+    this.paintLegend(pen);
+  }
+
   paintLegend(pen) {
     const path = this.bench.state.seen?.path ?? [];
-    if (!this.isPosed || !path.length) return;
+    if (!path.length) return;
     const used = REACHES.map((one, reach) => [one, reach]).filter(([, reach]) => path.some((place) => place[2] === reach));
     pen.font = "12px system-ui, sans-serif"; pen.textBaseline = "middle"; pen.textAlign = "right";
     let y = this.sheet.height - 16;
@@ -176,9 +182,16 @@ export class Seeing {
     pen.lineWidth = 1; pen.setLineDash([3, 3]);
     pen.beginPath(); pen.moveTo(px - ELLIPSE * c, py + ELLIPSE * s); pen.lineTo(px + ELLIPSE * c, py - ELLIPSE * s); pen.moveTo(px - b * s, py - b * c); pen.lineTo(px + b * s, py + b * c); pen.stroke();
     pen.setLineDash([]);
-    if (this.isDragged) { pen.globalAlpha = 1; return; }
+    pen.globalAlpha = 1;
+  }
+
+  // Its larger semi-axis, written over the links.
+  paintSize(pen, { sizes: [large], angle }) {
+    const { picture } = this.bench.state, at = picture.points.find(([ref]) => ref === picture.effector);
+    if (!at || !(large > 0) || this.isDragged) return;
+    const [px, py] = this.sheet.px(at[1], at[2]), c = Math.cos(angle), s = Math.sin(angle);
     const side = c < 0 ? -1 : 1, x = px + side * (ELLIPSE + 6) * c, y = py - side * (ELLIPSE + 6) * s;
-    pen.font = "11.5px system-ui, sans-serif"; pen.textBaseline = "middle"; pen.textAlign = Math.abs(c) > 0.3 ? "left" : "center"; pen.lineWidth = 4; pen.strokeStyle = this.sheet.colour("card");
+    pen.font = "11.5px system-ui, sans-serif"; pen.textBaseline = "middle"; pen.textAlign = Math.abs(c) > 0.3 ? "left" : "center"; pen.lineWidth = 4; pen.strokeStyle = this.sheet.colour("card"); pen.fillStyle = this.sheet.colour("good");
     const text = quantity(large, "m/N");
     pen.strokeText(text, x, y); pen.fillText(text, x, y);
   }
