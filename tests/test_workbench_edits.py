@@ -5,6 +5,7 @@ import math
 import random
 import re
 import tomllib
+from contextlib import suppress
 
 import pytest
 
@@ -62,9 +63,8 @@ def check_minimal(old, new):
     gone = [line for line in before if comment.match(line)]
     for line in (line for line in after if comment.match(line)):
         gone.remove(line)
-    gone_tables = [
-        one for one in entries_of(old) if one.kind == "header" and value_at(tomllib.loads(new), one.place) is None
-    ]
+    data = tomllib.loads(new)
+    gone_tables = [one for one in entries_of(old) if one.kind == "header" and value_at(data, one.place) is None]
     assert len(gone) <= 4 * len(gone_tables)
     # Of a line that has changed, the part outside of the changed values stays.
     found = places_of(new)
@@ -311,6 +311,34 @@ def test_messages_of_nonsense_are_refused_in_one_line():
                 assert Sheet(new).problem is None, chosen
 
 
+@pytest.mark.parametrize(
+    "text",
+    [
+        "",
+        "body = 3\njoint = []\n",
+        'name = "x"\n[joint]\nA = 3\n[motor]\nm = [1]\n[body.b]\ntype = "rigid"\npoints = 3\n',
+        'name = "x"\n[assembly]\na = 3\n[study]\nmodes = 3\n[ground]\nA = [1]\n[mode]\na = 3\n',
+        'name = "x"\n[body.b]\npoints = { A = "q" }\n[joint]\nA = ["ground", "b"]\n[parameters]\nq = "q"\n',
+    ],
+)
+def test_texts_that_are_no_models_are_refused_in_one_line(text):
+    known = {
+        "ground": {"A": 0},
+        "body": {"b": {"points": {"A": 0}}},
+        "joint": {"A": 1},
+        "motor": {"m": 1},
+        "study": {"x": 1},
+    }
+    hand = Hand(3)
+    for _ in range(80):
+        outcome(text, hand.action(known))
+    for place in ([], ["body"], ["joint"], ["motor", "m"], ["ground", "A"], ["body", "b"]):
+        with suppress(InputError):
+            fields(text, place)
+    with suppress(InputError):
+        outline(text)
+
+
 def test_text_that_is_not_toml_is_refused_with_its_line_and_column():
     with pytest.raises(InputError, match=r"line 2, column \d+"):
         apply('name = "x"\nlength = = 3\n', {"kind": "add-ground", "at": [0.0, 0.0]})
@@ -471,6 +499,16 @@ def test_deleting_names_what_depends_and_keeps_the_rest_in_place():
     assert after.place("link3.C", "drawn") == pytest.approx(before.place("link3.C", "drawn"), abs=1e-6)
     with pytest.raises(InputError, match=r"is used by body\.link1"):
         apply(text, {"kind": "delete", "names": ["section.bar"]})
+
+
+def test_links_that_would_hang_on_nothing_go_as_well():
+    text = drawn(CHAIN)
+    assert [one["name"] for one in what_goes(text, ["joint.B"])][2:4] == ["body.link2", "end_effector"]
+    # Without its joint on the ground the chain is whole, and stays where it is.
+    free = apply(text, {"kind": "delete", "names": ["joint.A"]}).text
+    assert Sheet(free).place("link2.C", "drawn") == pytest.approx((0.4, 0.05), abs=1e-5)
+    joined = apply(free, {"kind": "add-joint", "a": "ground.A", "b": "link1.A"}).text
+    assert "points" not in tomllib.loads(joined)["assembly"]["drawn"]
 
 
 def test_names_change_in_references_expressions_and_keys():

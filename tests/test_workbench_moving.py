@@ -8,15 +8,15 @@ import numpy as np
 import pytest
 
 import paraflex as pf
-from paraflex.errors import InputError
+from paraflex.errors import AssemblyError, InputError
 from paraflex.figures.kinematics import kinematics_of
 from paraflex.results import motion_dataset
 from paraflex.workbench.moving import Mover, assemblies
 from paraflex.workbench.turning import turning
 
 
-def mover_of(name, assembly=None):
-    return Mover(pf.load(name).mechanism, assembly)
+def mover_of(name):
+    return Mover(pf.load(name).mechanism)
 
 
 def link(name, length, *more):
@@ -29,7 +29,9 @@ def chain(*lengths, angles):
     points = ["ground.O", *(f"l{k}.b" for k in range(len(lengths)))]
     joints = tuple(pf.RevoluteJoint(f"j{k}", points[k], f"l{k}.a") for k in range(len(lengths)))
     given = {f"l{k}": angle for k, angle in enumerate(angles)}
-    return pf.Mechanism("chain", bodies=bodies, joints=joints, ground={"O": (0.0, 0.0)}, assemblies=(pf.Assembly("drawn", given),))
+    return pf.Mechanism(
+        "chain", bodies=bodies, joints=joints, ground={"O": (0.0, 0.0)}, assemblies=(pf.Assembly("drawn", given),)
+    )
 
 
 def four_bar(crank, coupler, rocker, base, angles):
@@ -105,7 +107,7 @@ def test_a_chain_with_more_freedoms_moves_least():
 
 
 def test_a_five_bar_stops_at_its_boundary():
-    mover = mover_of("five_bar", "outward")
+    mover = mover_of("five_bar")
     # Both legs of 0.25 + 0.25 m are stretched above the middle, one of them at the side.
     for target, expected in [((0.0, 2.0), (0.0, math.sqrt(0.24))), ((2.0, 0.0), (0.4, 0.0))]:
         moved = mover.drag("distal1", "C", target)
@@ -114,25 +116,26 @@ def test_a_five_bar_stops_at_its_boundary():
 
 
 def test_a_five_bar_stays_in_its_assembly_by_any_body():
-    for assembly in ("outward", "inward", "left", "right"):
-        mover = mover_of("five_bar", assembly)
+    mover = mover_of("five_bar")
+    for pose in assemblies(mover, hold="end-effector"):
+        mover.at(pose)
         start, signs, random = mover.q.copy(), np.sign(sines(mover)), np.random.default_rng(5)
         home = place(mover, "distal1.C")
         for body in ("distal1", "proximal1", "distal2", "proximal2"):
-            for _ in range(12):
+            for _ in range(4):
                 mover.drag(body, (0.25, 0.0), random.normal(scale=0.5, size=2))
                 assert np.array_equal(np.sign(sines(mover)), signs)
                 assert gap(mover) < 1e-9
         mover.at(start)
         mover.drag("distal1", "C", home)
-        for _ in range(12):
+        for _ in range(8):
             mover.drag("distal1", "C", random.normal(scale=0.5, size=2))
         assert mover.drag("distal1", "C", home).reached
         assert turned(mover.q, start, mover.system) < 1e-6
 
 
 def test_a_five_bar_stops_at_parallel_singular_positions():
-    mover = mover_of("five_bar", "outward")
+    mover = mover_of("five_bar")
     moved = mover.drag("distal1", "C", (0.0, 0.0))
     assert (moved.reached, moved.stop) == (False, "singular")
     assert "distal1 and distal2 in line" in moved.problem
@@ -140,13 +143,12 @@ def test_a_five_bar_stops_at_parallel_singular_positions():
 
 def test_a_crank_turns_through_the_dead_points_of_its_rocker():
     mover = Mover(four_bar(1.0, 3.0, 2.5, 3.5, (1.0, 0.5, 1.8)))
-    last = mover.angles()["crank"]
     for angle in np.linspace(1.0, 1.0 + 4.0 * np.pi, 81):
         moved = mover.drag("crank", "b", (math.cos(angle), math.sin(angle)))
         assert moved.reached
         assert moved.stop == ""
         assert gap(mover) < 1e-9
-    assert math.isclose(mover.angles()["crank"] - last, 4.0 * np.pi, abs_tol=1e-7)
+    assert math.isclose(mover.angles()["crank"], 1.0 + 4.0 * np.pi, abs_tol=1e-7)
 
 
 def test_a_rocker_stops_where_crank_and_coupler_are_in_line():
@@ -228,7 +230,7 @@ def test_a_changed_length_keeps_the_pose():
     assert gap(mover) < 1e-9
     again = Mover(replace(mechanism, assemblies=(pf.Assembly("here", mover.angles()),)))
     assert again.freedoms == 1
-    with pytest.raises(pf.AssemblyError):
+    with pytest.raises(AssemblyError):
         mover.redraw(four_bar(1.0, 9.0, 2.5, 3.5, (1.0, 0.5, 1.8)))
     assert mover.mechanism.body("coupler").points["b"] == (3.1, 0.0)
 

@@ -170,6 +170,15 @@ def test_a_process_that_does_not_stop_is_replaced(runner):
     assert active.wait(WITHIN) == -signal.SIGKILL
 
 
+def test_a_process_that_does_not_stop_is_replaced_without_a_spare_one():
+    with Runner(spare=False) as runner:
+        assert finished(runner, FIVE_BAR)["state"] == "done"
+        for text in (ENDLESS, FIVE_BAR):
+            run(runner, text).last("running", "done")
+            os.kill(runner._active.process.pid, signal.SIGSTOP)
+            assert finished(runner, FIVE_BAR)["state"] == "done"
+
+
 def test_a_killed_process_is_replaced_and_one_line_names_it(runner):
     heard = run(runner, ENDLESS)
     heard.last("running")

@@ -5,13 +5,13 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from paraflex.errors import InputError, NumericalError
+from paraflex.errors import InputError
 from paraflex.mechanism.quantities import known
 from .adding import ADDING
 from .changing import CHANGING
 from .dependents import falling, spelt, thing_of
 from .moving_points import move_point
-from .sheet import Sheet
+from .sheet import Sheet, refusals
 
 _ACTIONS = {**ADDING, **CHANGING, "move-point": move_point}
 # Tables whose entries about deleted members go without a word.
@@ -58,19 +58,11 @@ def apply(text: str, action: Mapping[str, Any], folder: Path | None = None) -> E
         raise InputError("not an action", field="action", value=action, remedy='give {"kind": "add-ground", ...}')
     known(action.get("kind", ""), list(_ACTIONS), "kind", "action")
     before = Sheet(text, folder or Path())
-    try:
-        _ = before.problem
+    with refusals(before, str(action["kind"])):
         if action.get("assembly") and action["kind"] != "pose":
             known(action["assembly"], before.names("assembly"), "assembly", "assembly")
         after, selected = _ACTIONS[action["kind"]](before, action)
         _check(before, after, action)
-    except InputError:
-        raise
-    except NumericalError as error:
-        raise InputError(error.problem, field=action["kind"], remedy=error.remedy) from None
-    except (TypeError, ValueError, KeyError, AttributeError, IndexError, OverflowError) as error:
-        problem = f"cannot be done as given ({type(error).__name__}: {error})"
-        raise InputError(problem, field=action["kind"], remedy="check what the action names") from error
     return Edited(after.text, selected, _note(before, action))
 
 
@@ -82,9 +74,10 @@ def what_goes(text: str, names: Sequence[Any]) -> list[dict[str, Any]]:
     InputError
         Unknown name, or member that something else needs.
     """
-    data = Sheet(text).data
-    things = [thing_of(data, name) for name in names]
-    found = falling(data, things)
+    sheet = Sheet(text)
+    with refusals(sheet, "names"):
+        things = [thing_of(sheet.data, name) for name in names]
+        found = falling(sheet.data, things)
     members = [place for place in found if place not in things and place[0] not in _BOOKKEEPING]
     return [{"kind": str(place[0]), "name": spelt(place), "place": list(place)} for place in members]
 

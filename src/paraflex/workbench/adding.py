@@ -95,7 +95,7 @@ def add_lump(sheet: Sheet, action: Action) -> Done:
     if sheet.data.get("body", {}).get(body, {}).get("type") not in ("beam", "assumed-modes"):
         raise InputError("not a point of a beam", field="at", value=action.get("at"),
                          remedy="a rigid body has a mass of its own")  # fmt: skip
-    lump = action.get("name") or next(iter(sheet.names("lump")), "pin")
+    lump = action.get("lump") or next(iter(sheet.names("lump")), "pin")
     if lump not in sheet.names("lump"):
         sheet = sheet.table(("lump", lump), {key: action.get(key, value) for key, value in _LUMP.items()})
     return sheet.put(("body", body, "lumps", point), lump), f"body.{body}"

@@ -1,5 +1,6 @@
 """The model of the text as far as it can be read, the pose that a person has moved it to, and the picture of both."""
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +21,7 @@ from .moving import Mover, assemblies
 from .picture import ground_picture, picture
 from .readiness import readiness
 from .seeing import Seeing
+from .sheet import Sheet
 
 
 class Bench:
@@ -50,7 +52,12 @@ class Bench:
 
     def read(self) -> Model:
         """Return the model of the text; InputError if it cannot be read."""
-        return model_of_text(self._document.text, self._document.name, self._document.folder)
+        document = self._document
+        sheet = Sheet(document.text, document.folder)
+        if not sheet.data.get("body"):
+            # Refused with the reason, which is not only that there are no bodies.
+            return model_of_text(document.text, document.name, document.folder)
+        return replace(sheet.model, source=document.name)
 
     def renew(self) -> None:
         """Read the text again; the picture stays if it cannot be read, and the pose is near the one before."""
@@ -98,6 +105,11 @@ class Bench:
                     self.problem = error
             except ParaflexError as other:
                 self.problem = other
+
+    @property
+    def is_moved(self) -> bool:
+        """Whether a person has moved the mechanism away from its assembly."""
+        return self._moved
 
     @property
     def assembly(self) -> str:

@@ -95,7 +95,12 @@ class Branches:
     @cached_property
     def elbows(self) -> list[Elbow]:
         """All elbows."""
-        return [one for joint in self.system.mechanism.joints if (one := self._elbow(joint)) is not None]
+        return self.elbows_to("", np.zeros(2))
+
+    def elbows_to(self, tip: str, local: Array) -> list[Elbow]:
+        """Return all elbows, also of a body with one joint only, towards a point in its frame [m]."""
+        found = [self._elbow(joint, tip, local) for joint in self.system.mechanism.joints]
+        return [one for one in found if one is not None]
 
     @cached_property
     def independent(self) -> Indices:
@@ -148,11 +153,11 @@ class Branches:
 
         return rows
 
-    def _elbow(self, joint: Joint) -> Elbow | None:
+    def _elbow(self, joint: Joint, tip: str, local: Array) -> Elbow | None:
         """Return the elbow at a joint; None if a body is no link there."""
         if joint.holds != ("points",) or joint.a.on_ground or joint.b.on_ground or joint.a.body == joint.b.body:
             return None
-        first, second = self._arm(joint, joint.a), self._arm(joint, joint.b)
+        first, second = (self._arm(joint, ref, tip, local) for ref in (joint.a, joint.b))
         if first is None or second is None:
             return None
         (one, along), (other, beside) = first, second
@@ -163,7 +168,7 @@ class Branches:
             text = f"{link.body} square to the slide of {slide.body}"
         return Elbow(joint.name, a, b, other - one, text)
 
-    def _arm(self, joint: Joint, ref: PointRef) -> tuple[float, bool] | None:
+    def _arm(self, joint: Joint, ref: PointRef, tip: str, local: Array) -> tuple[float, bool] | None:
         """Return the angle in a body's frame of its line from a joint to all its others, and whether one slides.
 
         A joint that slides lies at infinity, across its axis.
@@ -182,6 +187,9 @@ class Branches:
             else:
                 x, y = np.subtract(places[own.point], places[ref.point])
                 angles.append(float(np.arctan2(y, x)))
+        if not angles and ref.body == tip:
+            x, y = local - places[ref.point]
+            angles.append(float(np.arctan2(y, x)))
         if not angles or any(abs(np.sin(one - angles[0])) > _IN_LINE for one in angles):
             return None
         return angles[0], slides

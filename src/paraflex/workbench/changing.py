@@ -23,6 +23,8 @@ def set_value(sheet: Sheet, action: Action) -> Done:
     before, place = sheet, _place(action)
     sheet = _in_full(sheet, place)
     _check_place(sheet.data, place)
+    if isinstance(action.get("value"), Mapping) and value_at(sheet.data, place) is None and len(place) <= 2:
+        return placed(before, sheet.table([str(key) for key in place], action["value"], exact=True)), spelt(place)
     if "value" in action:
         text = written(action["value"], exact=True)
     else:
@@ -166,16 +168,17 @@ def _doubled(sheet: Sheet, action: Action, image: Callable[[Pose], Pose], *, mir
         table = sheet.data["body"][body]
         sheet = sheet.table(("body", new), _flipped(table, body) if mirrored else table, exact=True)
         for assembly in frames:
-            at = before.frames.get(assembly, {}).get(body)
+            at = before.frames(assembly).get(body)
             if at is not None and at.position is not None:
                 frames[assembly][new] = image(at)
                 sheet = sheet.put(("assembly", assembly, new), near(image(at).angle, 0.0))
+    known = [use for use in uses(before.data) if use.kind in ("ref", "joint", "body", "own")]
     for table in _COPIED:
         for name, member in before.data.get(table, {}).items():
-            sheet = _with_copy(sheet, before, (table, name), member, names, mirrored=mirrored)
-    return placed(
-        before, sheet, frames
-    ), f"body.{names['body', bodies[-1]]}" if bodies else f"ground.{names[named[-1]]}"
+            own = [use for use in known if use.place[:2] == (table, name)]
+            sheet = _with_copy(sheet, (table, name), member, own, names, mirrored=mirrored)
+    selected = ("body", bodies[-1]) if bodies else named[-1]
+    return placed(before, sheet, frames), f"{selected[0]}.{names[selected]}"
 
 
 def _pivots(sheet: Sheet, bodies: Sequence[str]) -> list[str]:
@@ -185,10 +188,9 @@ def _pivots(sheet: Sheet, bodies: Sequence[str]) -> list[str]:
 
 
 def _with_copy(
-    sheet: Sheet, before: Sheet, thing: Place, member: Any, names: dict[Place, str], *, mirrored: bool
+    sheet: Sheet, thing: Place, member: Any, own: Sequence[Use], names: dict[Place, str], *, mirrored: bool
 ) -> Sheet:
-    """Add a copy of a member if all that it names is copied."""
-    own = [use for use in uses(before.data) if use.place[:2] == thing and use.kind in ("ref", "joint", "body", "own")]
+    """Add a copy of a member if all that it names, at its own uses, is copied."""
     renamed_to = {
         use.place: next((new for each, to in names.items() if (new := replaced(use, each, to)) is not None), None)
         for use in own

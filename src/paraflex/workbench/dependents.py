@@ -118,7 +118,8 @@ def falling(data: Mapping[str, Any], things: Iterable[Place]) -> list[Place]:
                 raise InputError(f"is used by {listed(users, 5)}", field=spelt(thing), remedy="change these first")
             found += [place for place in [_falls(data, use)] if place not in found]
         found += [place for place in _also(data, thing) if place not in found]
-    return found
+    lost = _lost(data, found)
+    return falling(data, [*found, *lost]) if lost else found
 
 
 def _texts(data: Any, place: Place = ()) -> Iterator[tuple[Place, bool, str]]:
@@ -212,6 +213,20 @@ def _falls(data: Mapping[str, Any], use: Use) -> Place:
     if use.place[0] == "actuator" and isinstance(items, list) and len(items) > 1:
         return use.place
     return use.place[: 1 if use.place[0] in ("end_effector", "gravity", "payload") else 2]
+
+
+def _lost(data: Mapping[str, Any], gone: Sequence[Place]) -> list[Place]:
+    """Return the bodies that no joint connects any more with the ground, or with the first body if none is on it."""
+    bodies = [name for name in data.get("body", {}) if ("body", name) not in gone]
+    pairs = []
+    for name, joint in data.get("joint", {}).items():
+        refs = joint if isinstance(joint, list) else joint.get("points", [])
+        if ("joint", name) not in gone:
+            pairs.append({str(ref).partition(".")[0] for ref in refs})
+    reached = {GROUND} if any(GROUND in pair for pair in pairs) else set(bodies[:1])
+    for _ in bodies:
+        reached |= {name for pair in pairs if pair & reached for name in pair}
+    return [("body", name) for name in bodies if name not in reached]
 
 
 def _also(data: Mapping[str, Any], thing: Place) -> Iterator[Place]:

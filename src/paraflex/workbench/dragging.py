@@ -19,6 +19,8 @@ _LONGEST, _SHORTEST, _DIFFERENCE = 0.2, 1e-11, 1e-6
 REACHED = 1e-9
 # Largest residual of closed loops [sizes of the mechanism, rad], iterations with one factor, and factors.
 _CLOSED, _CHORDS, _FACTORS = 1e-13, 6, 4
+# Part of the distance that a straight step may leave; others follow the curvature.
+_FALL = 0.7
 # Part of its margin that a guard may lose by curvature.
 _SPARE = 0.7
 # Slopes and curvatures below these, relative to the distance, are zero; weight of violated guards beside the distance.
@@ -81,43 +83,66 @@ class Dragging:
 
     def approach(self, q: Array, target: Array, iterations: int) -> Array:
         """Return the pose nearest to a target that continuous motion from q leads to, or one on the way there."""
-        longest, room = _LONGEST, self.room(q)
+        longest, room, bent = _LONGEST, self.room(q), False
         for _ in range(iterations):
+            merit = self._merit(q, target, room)
             if self.distance(q, target) <= 0.1 * REACHED:
                 break
-            slope = self.slope(q, target)
-            step, merit = self._step(q, target, slope, room, longest), self._merit(q, target, room)
-            length = float(np.max(np.abs(step), initial=0.0))
-            while length > _SHORTEST:
-                trial = self.closed(q, step, slope.inverse)
-                if trial is not None:
-                    left = self.room(trial)
-                    if np.all(left > -_SPARE * self._margins) and self._merit(trial, target, left) < merit:
-                        break
-                step, length = 0.25 * step, 0.25 * length
-            else:
+            slope = self.slope(q, target, bent=bent)
+            step = self._step(q, target, slope, room, longest)
+            found = self._lower(q, target, step, slope, merit if bent else _FALL * merit, 1 if not bent else 0)
+            if found is None and bent:
                 break
-            q, room, longest = trial, left, min(_LONGEST, 4.0 * length)
+            if found is None:
+                bent = True
+                continue
+            moved, (q, room) = found[0], found[1:]
+            longest = min(_LONGEST, 4.0 * moved)
             if any(not guard.sign for guard in self.guards):
                 for guard in self.guards:
                     guard.pass_by(q)
                 room = self.room(q)
         return q
 
-    def slope(self, q: Array, target: Array) -> Slope:
-        """Return slope and curvature of half the squared distance, the latter of the Lagrangian by differences."""
+    def _lower(
+        self, q: Array, target: Array, step: Array, slope: Slope, merit: float, trials: int
+    ) -> tuple[float, Array, Array] | None:
+        """Return length, pose and room after a step, or a part of it, that leaves less than a merit; None without one.
+
+        The number of trials is not limited if it is zero.
+        """
+        length = float(np.max(np.abs(step), initial=0.0))
+        while length > _SHORTEST:
+            trial = self.closed(q, step, slope.inverse)
+            if trial is not None:
+                room = self.room(trial)
+                if np.all(room > -_SPARE * self._margins) and self._merit(trial, target, room) < merit:
+                    return length, trial, room
+            step, length, trials = 0.25 * step, 0.25 * length, trials - 1
+            if trials == 0:
+                break
+        return None
+
+    def slope(self, q: Array, target: Array, *, bent: bool = True) -> Slope:
+        """Return slope and curvature of half the squared distance, the latter of the Lagrangian by differences.
+
+        If it is not `bent`, the curvature is that of straight motions, and steps are least changes (Gauss and Newton).
+        """
         jacobian, rank = self.system.dimensionless_jacobian(q), self.system.n - self.freedoms
         left, sizes, right = np.linalg.svd(jacobian)
         free, inverse = right[rank:].T, right[:rank].T @ (left[:, :rank] / sizes[:rank]).T
         rows, off = self.rows(q), (self.place(q) - target) / self.system.size
         slope = rows.T @ off
+        along = rows @ free
+        if not bent:
+            return Slope(free, inverse, free.T @ slope, along.T @ along)
         multipliers, columns = -inverse.T @ slope, []
         here = slope + jacobian.T @ multipliers
         for column in free.T:
             there = q + _DIFFERENCE * self.system.units * column
             moved = self.rows(there).T @ off + self.system.dimensionless_jacobian(there).T @ multipliers
             columns.append(free.T @ (moved - here) / _DIFFERENCE)
-        curvature, along = np.array(columns).reshape(self.freedoms, self.freedoms), rows @ free
+        curvature = np.array(columns).reshape(self.freedoms, self.freedoms)
         return Slope(free, inverse, free.T @ slope, 0.5 * (curvature + curvature.T) + along.T @ along)
 
     def closed(self, q: Array, step: Array, inverse: Array) -> Array | None:

@@ -20,16 +20,23 @@ from starlette.websockets import WebSocket, WebSocketDisconnect
 from .document import Document
 from .messages import finite
 from .page import module, page, style
-from .session import Session
+from .session import SLOW, Session
 
 # Largest message [bytes], time without a page after which the server ends, and time between two looks at the file [s].
 _LARGEST, _ALONE, _LOOK = 8_000_000, 4.0, 0.3
+_SERVING: dict[str, Any] = {
+    "log_level": "critical", "lifespan": "on", "ws": "websockets-sansio", "ws_max_size": _LARGEST,
+    "timeout_graceful_shutdown": 1,
+}  # fmt: skip
 _POLICY = (
     "default-src 'none'; script-src 'self'; style-src 'self'; img-src 'self' data: blob:; connect-src 'self'; "
     "base-uri 'none'; form-action 'none'; frame-ancestors 'none'"
 )
 # Reports are complete in one file and load nothing.
-_MADE_POLICY = "default-src 'none'; script-src 'unsafe-inline' 'unsafe-eval'; style-src 'unsafe-inline'; img-src data: blob:; font-src data:"
+_MADE_POLICY = (
+    "default-src 'none'; script-src 'unsafe-inline' 'unsafe-eval'; style-src 'unsafe-inline'; img-src data: blob:; "
+    "font-src data:"
+)
 
 
 class Host:
@@ -51,12 +58,9 @@ class Host:
         self._context = copy_context()
         # One thread for all messages: they are answered in their order.
         self._worker = ThreadPoolExecutor(1, thread_name_prefix="workbench")
+        self._slow = ThreadPoolExecutor(1, thread_name_prefix="workbench-slow")
         self.session = Session(document, self._send)
-        self._server = uvicorn.Server(
-            uvicorn.Config(
-                self._app(), log_level="critical", lifespan="on", ws="websockets-sansio", ws_max_size=_LARGEST, timeout_graceful_shutdown=1
-            )
-        )  # fmt: skip
+        self._server = uvicorn.Server(uvicorn.Config(self._app(), **_SERVING))
 
     @property
     def address(self) -> str:
@@ -69,6 +73,7 @@ class Host:
             asyncio.run(self._server.serve(sockets=[self._socket]))
         finally:
             self._worker.shutdown(cancel_futures=True)
+            self._slow.shutdown(cancel_futures=True)
             self.session.close()
             self._socket.close()
 
@@ -122,17 +127,22 @@ class Host:
         try:
             while True:
                 text = await page.receive_text()
-                message = _parsed(text)
-                answer = await asyncio.get_running_loop().run_in_executor(self._worker, self._answered, message)
-                replies.put_nowait(answer)
+                self._take(_parsed(text), replies)
         except (WebSocketDisconnect, RuntimeError, KeyError):
             pass
         finally:
             del self._pages[page]
             sending.cancel()
 
+    def _take(self, message: Any, replies: "asyncio.Queue[dict[str, Any]]") -> None:
+        """Have a message answered after those before it; slow ones after other slow ones."""
+        slow = isinstance(message, dict) and message.get("do") in SLOW
+        loop = asyncio.get_running_loop()
+        future = loop.run_in_executor(self._slow if slow else self._worker, self._answered, message)
+        future.add_done_callback(lambda done: done.cancelled() or replies.put_nowait(done.result()))
+
     def _answered(self, message: Any) -> dict[str, Any]:
-        return self._context.run(self.session.answer, message)
+        return self._context.copy().run(self.session.answer, message)
 
     def _send(self, event: dict[str, Any]) -> None:
         """Send an event to all pages, from any thread."""

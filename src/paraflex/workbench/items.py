@@ -11,7 +11,7 @@ from paraflex.files.schema import ModelTable
 from paraflex.mechanism.members import TASK_COORDINATES
 from .dependents import uses
 from .edits import written
-from .sheet import Sheet
+from .sheet import Sheet, refusals
 from .spans import entries_of
 
 # Tables whose members are numbers, names or lists, which have no fields of their own.
@@ -28,17 +28,12 @@ def outline(text: str) -> list[dict[str, Any]]:
 
     A motor, spring or sensor belongs to the joint that it names, a joint or load to the body whose point it names.
     """
-    data = Sheet(text).data
-    named: dict[tuple[str, ...], list[list[Any]]] = {}
-    for use in uses(data):
-        owner = list(use.place[: 1 if use.place[0] in ("end_effector", "study") else 2])
-        for thing in _things(use.kind, use.text, use.place):
-            if owner != list(thing) and use.place[0] not in ("assembly", "start", "study", "statics"):
-                found = named.setdefault(thing, [])
-                found += [owner] if owner not in found else []
+    sheet = Sheet(text)
+    with refusals(sheet, "file"):
+        named = _named(sheet.data)
+        members = list(_members(sheet.data))
     return [
-        {"kind": place[0], "name": place[-1], "place": list(place), "owns": named.get(place, [])}
-        for place in _members(data)
+        {"kind": place[0], "name": place[-1], "place": list(place), "owns": named.get(place, [])} for place in members
     ]
 
 
@@ -56,10 +51,24 @@ def fields(text: str, place: Sequence[Any]) -> dict[str, Any]:
     found = value_at(sheet.data, place) if place else sheet.data
     if found is None:
         raise InputError("is not in the file", field=".".join(map(str, place)), remedy="choose a member of the file")
-    if place[:1] == ("motor",) and len(place) == 2 and isinstance(found, str):
-        return {"fields": [_row(sheet, place, "joint")], "addable": list(_addable(sheet.data, place, {"joint": found}))}
-    rows = list(_rows(sheet, place, found, ""))
-    return {"fields": rows, "addable": list(_addable(sheet.data, place, found))}
+    with refusals(sheet, ".".join(map(str, place))):
+        if place[:1] == ("motor",) and len(place) == 2 and isinstance(found, str):
+            rows, found = [_row(sheet, place, "joint")], {"joint": found}
+        else:
+            rows = list(_rows(sheet, place, found, ""))
+        return {"fields": rows, "addable": list(_addable(sheet.data, place, found))}
+
+
+def _named(data: Mapping[str, Any]) -> dict[tuple[str, ...], list[list[Any]]]:
+    """Return by member the places of what names it, except of settings and poses."""
+    named: dict[tuple[str, ...], list[list[Any]]] = {}
+    for use in uses(data):
+        owner = list(use.place[: 1 if use.place[0] == "end_effector" else 2])
+        for thing in _things(use.kind, use.text, use.place):
+            if owner != list(thing) and use.place[0] not in ("assembly", "start", "study", "statics"):
+                found = named.setdefault(thing, [])
+                found += [owner] if owner not in found else []
+    return named
 
 
 def _members(data: Mapping[str, Any]) -> Iterator[tuple[str, ...]]:

@@ -134,7 +134,7 @@ def _place(sheet: Sheet, at: Any, assembly: str) -> XY:
 def _joint_name(sheet: Sheet, ref: str) -> str:
     """Return the name of the point for a new joint, with a number if it is taken."""
     point = ref.partition(".")[2]
-    return point if point not in sheet.names("joint") else sheet.fresh(point, "joint")
+    return point if point not in sheet.names("joint") else sheet.fresh(f"{point}_", "joint")
 
 
 def _pinned(sheet: Sheet, a: str, b: str) -> Sheet:

@@ -291,7 +291,8 @@ class Mover:
         lost = self._rank(drag, q, slope.free) < self._rank(drag, *self._usual)
         if not near and not lost:
             return "", ""
-        in_line = [one.text for one in self._branches.elbows if abs(np.sin(q[one.b] - q[one.a] + one.offset)) < _NAMED]
+        elbows = self._branches.elbows_to(here.body, drag.local)
+        in_line = [one.text for one in elbows if abs(np.sin(q[one.b] - q[one.a] + one.offset)) < _NAMED]
         texts = dict.fromkeys([guard.text for guard in near if guard.text] + in_line)
         stop = "singular" if near and falling else "reach"
         own = "singular position" if stop == "singular" else f"limit of reach of {here.body}"

@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 
 from paraflex.arrays import Array, Numbers
+from paraflex.errors import ParaflexError
 from paraflex.mechanism import GROUND, Body, LumpedMass, Mechanism, PointRef
 from paraflex.mechanism.poses import Pose, local_points
 from paraflex.plots.marks import LOOKS, moving_marks, still_marks, support
@@ -131,6 +132,6 @@ def _pair(place: Array) -> list[float]:
 
 def _line(places: Numbers) -> list[Any]:
     """Return the points of a line; gaps are null."""
-    whole = np.isfinite(places).all(axis=-1)
+    whole = np.asarray(np.isfinite(places).all(axis=-1))
     rounded = np.round(places, _DIGITS).tolist()
     return [point if known else None for point, known in zip(rounded, whole.tolist(), strict=True)]

@@ -17,8 +17,9 @@ from .worker import BEGUN, ENDED, NO_REQUEST, READY
 OnEvent = Callable[[dict[str, Any]], None]
 
 _CHILD = "import sys; sys.path[:] = {path!r}; from paraflex.workbench.worker import main; main()"
-# Time after which a process that does not stop its run is replaced, and in which one ends by itself [s].
-_PATIENCE, _LEAVING = 0.3, 2.0
+# Times after which a process that does not stop its run is replaced by the spare one if it is ready, and by any; and in
+# which a process ends by itself [s].
+_PATIENCE, _LONGEST, _LEAVING = 0.6, 3.0, 2.0
 
 
 class Runner:
@@ -104,21 +105,22 @@ class Runner:
         if self._active is None:
             self._active, self._spare = self._spare or _Process(self), None
         self._active.send(self._number, request)
-        if self._active.running != NO_REQUEST:
-            timer = threading.Timer(_PATIENCE, self._replace)
+        for after, by_any in ((_PATIENCE, False), (_LONGEST, True)) if self._active.ready else ():
+            timer = threading.Timer(after, self._replace, [by_any])
             timer.daemon = True
             timer.start()
         return self._number
 
-    def _replace(self) -> None:
-        """Let the spare process take over if it is ready and the other one still runs what is no longer wanted."""
+    def _replace(self, by_any: bool = False) -> None:
+        """Let the spare process, if it is ready, or any take over from one that does not begin the newest request."""
         with self._lock:
             active, spare = self._active, self._spare
-            if active is None or spare is None or not spare.ready or active.running in (NO_REQUEST, self._number):
+            if active is None or not active.ready or active.begun == self._number:
                 return
-            self._active, self._spare = spare, _Process(self)
-            spare.send(self._number, self._request)
-            active.process.kill()
+            if by_any or (spare is not None and spare.ready):
+                self._active, self._spare = spare or _Process(self), None
+                self._active.send(self._number, self._request)
+                active.process.kill()
 
     def take(self, process: "_Process", number: int, event: dict[str, Any]) -> None:
         """Take an event of a process: pass it on if it belongs to the newest request."""
@@ -126,10 +128,10 @@ class Runner:
         with self._lock:
             if state == READY:
                 process.ready = True
-                self._fill()
                 self._replace()
             elif state in (BEGUN, ENDED):
-                process.running = number if state == BEGUN else NO_REQUEST
+                process.begun, process.busy = number, state == BEGUN
+            self._fill()
             newest = number in (self._number, NO_REQUEST) and process is self._active and self._request is not None
             if state in (READY, BEGUN, ENDED) or not newest:
                 return
@@ -144,9 +146,9 @@ class Runner:
             if process is not self._active:
                 return
             self._active, self._spare = self._spare, None
-            self._fill()
             number, waiting, on_event = self._number, self._request is not None, self._on_event
             self._request = None
+            self._fill()
         why = f"signal {-code}: out of memory, or killed" if code < 0 else f"exit code {code}"
         text = f"the process of the run ended before it ({why}); run it again"
         if waiting:
@@ -154,8 +156,9 @@ class Runner:
             _deliver(on_event, number, {"state": "error", "text": text, "error": error})
 
     def _fill(self) -> None:
-        """Start the spare process as soon as the other one is ready, which it would slow down."""
-        if self._wants_spare and self._spare is None and self._active is not None and self._active.ready:
+        """Start the spare process when the other one is ready and has nothing to do, as it would slow it down."""
+        idle = self._active is not None and self._active.ready and not self._active.busy and self._request is None
+        if idle and self._wants_spare and self._spare is None:
             self._spare = _Process(self)
 
 
@@ -171,7 +174,7 @@ class _Process:
     """Process of `worker.main`, with a thread that reads its events."""
 
     def __init__(self, runner: Runner) -> None:
-        self.ready, self.running, self._runner = False, NO_REQUEST, runner
+        self.ready, self.busy, self.begun, self._runner = False, False, NO_REQUEST, runner
         command = [sys.executable, "-c", _CHILD.format(path=sys.path)]
         with starting_processes():
             self.process: Any = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE)

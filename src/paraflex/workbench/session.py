@@ -4,6 +4,7 @@ import tempfile
 import threading
 import traceback
 from collections.abc import Callable
+from contextlib import nullcontext
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +22,11 @@ from .picture import looks
 from .programs import program
 from .runs import Runner
 from .turning import turning
+
+# Actions that name no places on the sheet.
+_WITHOUT_PLACES = ("set", "unset", "rename", "delete", "pose")
+# Requests that take seconds, and do not hold others up.
+SLOW = ("leave",)
 
 
 class Session:
@@ -52,8 +58,8 @@ class Session:
         number = message.get("id") if isinstance(message, dict) else None
         number = number if isinstance(number, int) else None
         try:
-            with self._lock, loose_bodies():
-                asked = field(message, "do", str)
+            asked = field(message, "do", str)
+            with nullcontext() if asked in SLOW else self._lock, loose_bodies():
                 if asked not in self._requests:
                     remedy = suggestion(asked, [*self._requests])
                     raise InputError("unknown request", field="do", value=asked[:60], remedy=remedy)
@@ -97,11 +103,21 @@ class Session:
         return self._changed(field(message, "text", str))
 
     def _do_act(self, message: Message) -> Message:
-        edited = apply(self.document.text, field(message, "action", dict), self.document.folder)
+        action, text = field(message, "action", dict), self.document.text
+        if self.bench.is_moved and action.get("kind") not in _WITHOUT_PLACES:
+            # Places on the page are those of the pose that it shows.
+            text = self._posed()
+        edited = apply(text, action, self.document.folder)
         # What a slider changes while it is moved is one step.
         live, self._live = self._live, message.get("live")
         self.document.change(edited.text, same=live is not None and live == self._live)
         return {**self._renewed(), "selected": edited.selected, "note": edited.note}
+
+    def _posed(self) -> str:
+        """Return the text with the present pose as the assembly."""
+        mover = self.bench.mover
+        action = {"kind": "pose", "assembly": self.bench.assembly, "angles": mover.angles(), "points": mover.places()}
+        return apply(self.document.text, action, self.document.folder).text
 
     def _do_goes(self, message: Message) -> Message:
         return {"goes": what_goes(self.document.text, field(message, "names", list))}
@@ -151,11 +167,7 @@ class Session:
         return self.bench.back()
 
     def _do_pose(self, _: Message) -> Message:
-        bench, mover = self.bench, self.bench.mover
-        action = {"kind": "pose", "assembly": bench.assembly, "angles": mover.angles(), "places": mover.places()}
-        edited = apply(self.document.text, action, self.document.folder)
-        mover.release()
-        return self._changed(edited.text)
+        return self._changed(self._posed())
 
     def _do_assemblies(self, _: Message) -> Message:
         return self.bench.found_assemblies()

@@ -1,8 +1,9 @@
 """Sheet: the text of a model file that may still be incomplete, with its numbers and the poses that it describes."""
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 from math import atan2, hypot, pi
 from pathlib import Path
 from typing import Any
@@ -10,7 +11,7 @@ from typing import Any
 from paraflex.dynamics import closure_of, reference_pose, standing_system
 from paraflex.errors import InputError, NumericalError, suggestion
 from paraflex.expressions.evaluate import evaluate as evaluate_text, evaluate_parameters, expressed_in
-from paraflex.files.fields import value_at
+from paraflex.files.fields import leaves, value_at
 from paraflex.files.model import Model, model_from
 from paraflex.files.rows import with_rows
 from paraflex.mechanism import Assembly, Joint, Mechanism, PointRef
@@ -34,6 +35,8 @@ class Frame(Pose):
         return self.position
 
 
+# Longest text that may name a file.
+_NAME_LETTERS = 255
 # Stands in for the bodies of a sheet without any, so that the rest of the file is read and checked.
 _NO_BODY = {"body": {"none": {"type": "rigid", "points": {"none": [0.0, 0.0]}}}}
 
@@ -59,11 +62,7 @@ class Sheet:
         InputError
             See `paraflex.load`; a sheet without bodies, which cannot be loaded, is read as if it had one.
         """
-        data = with_rows(self.data, self.folder)
-        empty = not data.get("body")
-        return model_from(
-            {key: each for key, each in data.items() if key != "assembly"} | _NO_BODY if empty else data, ""
-        )
+        return _model(self.text, self.folder, _written_at(self.data, self.folder))
 
     @cached_property
     def problem(self) -> InputError | None:
@@ -106,10 +105,15 @@ class Sheet:
         return chosen if chosen in self.names("assembly") else next(iter(self.names("assembly")), "")
 
     @cached_property
-    def frames(self) -> dict[str, dict[str, Pose]]:
-        """Poses of the body frames in each assembly, loops closed where they can be."""
-        found = self.mechanism
-        return {one.name: _frames(found, one) for one in found.assemblies} if found else {}
+    def _known_frames(self) -> dict[str, dict[str, Pose]]:
+        return {}
+
+    def frames(self, assembly: str) -> dict[str, Pose]:
+        """Return the poses of the body frames in an assembly, loops closed where they can be."""
+        if assembly not in self._known_frames:
+            found = [one for one in self.mechanism.assemblies if one.name == assembly] if self.mechanism else []
+            self._known_frames[assembly] = _frames(self.model.mechanism, found[0]) if found else {}
+        return self._known_frames[assembly]
 
     @cached_property
     def locals(self) -> dict[str, Mapping[str, XY]]:
@@ -127,7 +131,7 @@ class Sheet:
 
     def frame(self, body: str, assembly: str) -> "Frame":
         """Return the pose of a body in an assembly; an error if it is not known."""
-        found = self.frames.get(assembly, {}).get(body)
+        found = self.frames(assembly).get(body)
         if found is None or found.position is None:
             raise self.problem or InputError(
                 "its place is not known", field=f"body.{body}", remedy="give its angle in an assembly"
@@ -153,7 +157,7 @@ class Sheet:
 
     def angle(self, body: str, assembly: str) -> float:
         """Return the angle of a body in an assembly [rad]; zero for the ground."""
-        frame = self.frames.get(assembly, {}).get(body)
+        frame = self.frames(assembly).get(body)
         return 0.0 if frame is None else frame.angle
 
     def with_text(self, text: str) -> "Sheet":
@@ -204,6 +208,41 @@ class Sheet:
 Done = tuple[Sheet, str]
 
 
+@contextmanager
+def refusals(sheet: Sheet, field: str) -> Iterator[None]:
+    """Provide a context whose errors are all `InputError`: of what is asked for, or of the text if it is no model."""
+    try:
+        yield
+    except InputError:
+        raise
+    except NumericalError as error:
+        raise InputError(error.problem, field=field, remedy=error.remedy) from None
+    except (TypeError, ValueError, LookupError, AttributeError, ArithmeticError) as error:
+        problem = f"cannot be done as given ({type(error).__name__}: {error})"
+        raise sheet.problem or InputError(problem, field=field, remedy="check the names and numbers given") from error
+
+
+@lru_cache(maxsize=4)
+def _model(text: str, folder: Path, _: tuple[str, ...]) -> Model:
+    """Return the model of a text and of files named in it as they were written last: an action reads two texts."""
+    data = with_rows(data_of(text), folder)
+    empty = not data.get("body")
+    return model_from(
+        {key: each for key, each in data.items() if key != "assembly"} | _NO_BODY if empty else data, "", text
+    )
+
+
+def _written_at(data: Any, folder: Path) -> tuple[str, ...]:
+    """Return when the files were written that texts in data may name."""
+    found = []
+    for _, value in leaves(data):
+        if isinstance(value, str) and "." in value and len(value) < _NAME_LETTERS:
+            with suppress(OSError, ValueError):
+                state = (folder / value).stat()
+                found.append(f"{value} {state.st_mtime_ns} {state.st_size}")
+    return tuple(found)
+
+
 def check_name(name: Any, names: Iterable[str], field: str) -> None:
     """Check that a new name is a text that can stand in a reference and that is not taken."""
     if not isinstance(name, str) or not name or "." in name or not name.isprintable():
@@ -224,13 +263,11 @@ def placed(before: Sheet, after: Sheet, frames: Mapping[str, Mapping[str, Pose]]
     """
     known = before.unplaced()
     for assembly, bodies in after.unplaced().items():
-        poses = {**before.frames.get(assembly, {}), **(frames or {}).get(assembly, {})}
-        for body in after.locals:
+        for body in [name for name in after.locals if name in bodies - known.get(assembly, set())]:
+            pose = (frames or {}).get(assembly, {}).get(body) or before.frames(assembly).get(body)
+            point, local = next(iter(after.locals[body].items()), ("", (0.0, 0.0)))
             # A body that is placed may determine the place of the next one.
-            if body not in bodies - known.get(assembly, set()) or body not in after.unplaced()[assembly]:
-                continue
-            pose, (point, local) = poses.get(body), next(iter(after.locals[body].items()), ("", (0.0, 0.0)))
-            if point and pose is not None and pose.position is not None:
+            if point and pose is not None and pose.position is not None and body in after.unplaced()[assembly]:
                 after = after.put(("assembly", assembly, "points", f"{body}.{point}"), tidy(pose.place_of(local)))
     return after
 

@@ -35,7 +35,7 @@ export class Dragging {
       button("Keep this pose", "The dragged pose becomes the assembly of the file", () => bench.request("pose"), { class: "main" }),
       button("Back", "The assembly of the file again", () => this.back()));
     bench.parts.stage.append(this.badge, this.posed);
-    bench.on("state", () => { this.posed.hidden = true; });
+    bench.on("state", () => { this.posed.hidden = !bench.state.moved; });
   }
 
   press(px, event, held) {

@@ -69,7 +69,7 @@ export class Drawing {
     const under = this.sheet.hitBody(...this.tools.pointer ?? place.px);
     if (!under) return null;
     const before = new Set(this.sheet.shown.points.map(([ref]) => ref));
-    if (!await this.bench.act({ kind: "add-point", body: under.name, at: place.at })) return null;
+    if (!await this.bench.act({ kind: "add-point", body: under.name, at: under.foot ?? place.at })) return null;
     return this.bench.state.picture?.points.map(([ref]) => ref).find((ref) => !before.has(ref)) ?? null;
   }
 

@@ -10,7 +10,9 @@ export function element(tag, attributes = {}, ...children) {
   return made;
 }
 
-export const button = (text, title, onclick, attributes = {}) => element("button", { type: "button", title, "aria-label": title, onclick, ...attributes }, text);
+// A button; its title is also its name where its text is a symbol.
+export const button = (text, title, onclick, attributes = {}) =>
+  element("button", { type: "button", title, "aria-label": /[a-z]{3}/i.test(text) ? null : title, onclick, ...attributes }, text);
 
 // Prefixes of SI units from the smallest to the largest, and the units that take them.
 const PREFIXES = [[1e-9, "n"], [1e-6, "µ"], [1e-3, "m"], [1, ""], [1e3, "k"], [1e6, "M"], [1e9, "G"]];

@@ -219,7 +219,7 @@ export class Sheet {
       clear.set(`${Math.round((left + right) / 2)} ${Math.round((top + bottom) / 2)}`, (right - left) / 2);
     }
     for (const { kind, name } of this.bench.selected) {
-      const [, , x, y] = kind === "joint" ? shown.joints.find(([one]) => one === name) ?? [] : [];
+      const [x, y] = ((kind === "joint" ? shown.joints : shown.points).find(([one]) => one === name) ?? []).slice(kind === "joint" ? 2 : 1);
       if (x !== undefined) clear.set(this.px(x, y).map(Math.round).join(" "), 13);
     }
     for (const [name, , x, y] of shown.joints) {
@@ -230,7 +230,7 @@ export class Sheet {
     for (const [where, names] of atJoint) add(names.join(", "), `joint ${names[0]}`, where.split(" ").map(Number), this.colour("soft"), clear.get(where));
     for (const [ref, x, y] of shown.points) {
       const place = this.px(x, y), where = `${Math.round(place[0])} ${Math.round(place[1])}`;
-      if (!atJoint.has(where)) { add(ref.split(".").pop(), `point ${ref}`, place, this.colour("soft")); taken.push(place); }
+      if (!atJoint.has(where)) { add(ref.split(".").pop(), `point ${ref}`, place, this.colour("soft"), clear.get(where)); taken.push(place); }
     }
     for (const [, look, name, points] of shown.marks) if (name && ["load", "spring", "sensor"].includes(look) && !written.has(name)) { written.add(name); add(name, `${look} ${name}`, this.px(...points[0]), this.colour(look === "load" ? "trail" : "soft")); }
     shown.bodies.forEach(([name, points], k) => {
@@ -273,8 +273,8 @@ export class Sheet {
     for (const [name, points, plate] of this.shown.bodies) {
       const pixels = points.filter(Boolean).map((point) => this.px(...point));
       for (let k = 1; k < pixels.length; k++) {
-        const far = toSegment([px, py], pixels[k - 1], pixels[k]);
-        if (far < least) { least = far; best = { kind: "body", name, at: this.metres(px, py) }; }
+        const [foot, far] = toSegment([px, py], pixels[k - 1], pixels[k]);
+        if (far < least) { least = far; best = { kind: "body", name, at: this.metres(px, py), foot: this.metres(...foot) }; }
       }
       if (plate && !best && inside([px, py], pixels)) best = { kind: "body", name, at: this.metres(px, py) };
     }
@@ -282,10 +282,11 @@ export class Sheet {
   }
 }
 
+// The place on a segment that is nearest to another one, and how far that is.
 function toSegment([x, y], [ax, ay], [bx, by]) {
   const dx = bx - ax, dy = by - ay, long = dx * dx + dy * dy;
   const share = long ? Math.max(0, Math.min(1, ((x - ax) * dx + (y - ay) * dy) / long)) : 0;
-  return Math.hypot(x - ax - share * dx, y - ay - share * dy);
+  return [[ax + share * dx, ay + share * dy], Math.hypot(x - ax - share * dx, y - ay - share * dy)];
 }
 
 function inside([x, y], corners) {

@@ -164,7 +164,7 @@ export class Tools {
     this.sheet.canvas.focus({ preventScroll: true });
     this.sheet.canvas.setPointerCapture(event.pointerId);
     this.pointers.set(event.pointerId, px);
-    this.cursor = null;
+    this.cursor = this.under = null;
     if (event.pointerType === "touch" && this.pointers.size === 2) { this.cancel(); this.pinch = this.spread(); return; }
     if (this.pinch || this.pointers.size > 1) return;
     if (event.button === 1 || event.button === 2 || this.spaceHeld) {

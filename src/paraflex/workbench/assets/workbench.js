@@ -112,7 +112,10 @@ class Workbench {
   }
 
   async begin() {
+    const slow = setTimeout(() => this.say("Opening; the first time after an installation this takes half a minute …"), 700);
     const { looks, recovered, ...state } = await this.link.ask("open");
+    clearTimeout(slow);
+    this.say("");
     this.looks = looks;
     this.take(state);
     this.sheet.fit();
