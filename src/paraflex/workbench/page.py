@@ -9,9 +9,9 @@ from paraflex.plots.themes import THEMES
 
 # Modules in the order in which they are joined; each imports only from those before it.
 _MODULES = (
-    "elements.js", "colours.js", "link.js", "names.js", "places.js", "sheet.js", "icons.js", "dragging.js", "drawing.js", "painting.js",
-    "tools.js", "fields.js", "outline.js", "text.js", "photograph.js", "start.js", "curves.js", "recordings.js", "pulling.js", "motion.js", "seeing.js", "leave.js",
-    "workbench.js",
+    "elements.js", "colours.js", "link.js", "names.js", "places.js", "sheet.js", "icons.js", "dragging.js",
+    "drawing.js", "painting.js", "tools.js", "fields.js", "outline.js", "text.js", "photograph.js", "start.js",
+    "curves.js", "recordings.js", "pulling.js", "motion.js", "seeing.js", "leave.js", "workbench.js",
 )  # fmt: skip
 # Scripts of reports that stand before the modules, and the style sheets.
 _SHARED, _STYLES = ("unpacking.js",), ("workbench.css", "panels.css")

@@ -44,8 +44,9 @@ def turning(model: Model, *, assembly: str | None = None, **wishes: Any) -> dict
     -------
     dict
         Numbers in SI units and radians, None where there is none: what drives the mechanism (`drive`, `path`, `mode`,
-        `freedoms`, `over`), `time`, `frames`, `film` as a report has it, `curves`, `trails`, and the features as `paraflex kinematics` has them
-        (`features`, `tiles`, `tables`, `note`), `findings`, and why there are no forces (`loads_problem`).
+        `freedoms`, `over`), `time`, `frames`, `film` as a report has it, `curves`, `trails`, and the features as
+        `paraflex kinematics` has them (`features`, `tiles`, `tables`, `note`), `findings`, and why there are no forces
+        (`loads_problem`).
 
     Raises
     ------
