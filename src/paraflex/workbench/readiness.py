@@ -48,17 +48,15 @@ def readiness(
     return _of_motion(model, int(seen["freedoms"])) or _of_study(model, seen)
 
 
-def checked(model: Model, ready: Message) -> Message:
-    """Return what `readiness` found, corrected by all checks of `paraflex info`, which take longer than an edit may.
+def checked(model: Model) -> Message:
+    """Return whether all checks of `paraflex info` let a model run; they take longer than an edit may.
 
-    A model whose run would be wrong is not ready. `findings` has a line for each finding.
+    The message is that of `readiness`, for a run that would be wrong, with `findings`, a line each.
     """
     verdict = check(model)
-    ready = {**ready, "findings": finding_lines(verdict)}
-    wrong = next((one for one in verdict if one.level is Level.WRONG), None)
-    if wrong is None or not ready["ok"]:
-        return ready
-    return {**ready, **_not(f"{wrong.place}: {wrong.text}; {wrong.remedy}", _parts(wrong.place))}
+    wrong = [_not(f"{one.place}: {one.text}; {one.remedy}", _parts(one.place)) for one in verdict
+             if one.level is Level.WRONG]  # fmt: skip
+    return {"ok": True, **(wrong[0] if wrong else {}), "findings": finding_lines(verdict)}
 
 
 def _of_motion(model: Model, freedoms: int) -> Message | None:
