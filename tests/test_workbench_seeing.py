@@ -16,7 +16,6 @@ from paraflex.errors import AssemblyError, InputError
 from paraflex.files.library import library_names, library_text
 from paraflex.files.model import model_of_text
 from paraflex.mechanism import RigidBody
-from paraflex.workbench.bench import Bench
 from paraflex.workbench.bending import drag_force, linear
 from paraflex.workbench.document import Document
 from paraflex.workbench.moving import Mover
@@ -378,3 +377,125 @@ class TestLinear:
     def test_nothing_excites_a_pendulum(self):
         with pytest.raises(InputError, match="nothing excites it"):
             linear(*read(library_text("pendulum")), "")
+
+
+LINKS = """
+[body.{0}]
+points = {{ {1} = [0.0, 0.0], {2} = [{3}, 0.0] }}
+"""
+# What a person adds from the empty sheet to a five-bar that runs, and the sentence after each step.
+STEPS = [
+    ("", "Draw a link", "link"),
+    ("\n[ground]\nA = [-0.1, 0.0]\nE = [0.1, 0.0]\n", "Draw a link", "link"),
+    (LINKS.format("a", "A", "B", 0.25), "Join the links", "link"),
+    ('\n[joint]\nA = ["ground.A", "a.A"]\n\n[assembly.drawn]\na = 2.16\n', "Choose what moves it: a motor, or the crank",
+     "drive"),
+    (LINKS.format("b", "B", "C", 0.25) + '\n[joint.B]\ntype = "revolute"\npoints = ["a.B", "b.B"]\n',
+     "Choose what moves it: 2 motors", "motor"),
+    (LINKS.format("c", "E", "D", 0.25) + LINKS.format("d", "D", "C", 0.25)
+     + '\n[joint.E]\ntype = "revolute"\npoints = ["ground.E", "c.E"]\n'
+     + '\n[joint.D]\ntype = "revolute"\npoints = ["c.D", "d.D"]\n'
+     + '\n[joint.C]\ntype = "revolute"\npoints = ["b.C", "d.C"]\n', "Choose what moves it: 2 motors", "motor"),
+    ('\n[motor]\nleft = "A"\n', "It can be moved by hand; for a run, give a a mass", ""),
+    ("masses", "No end-effector", "effector"),
+    ('\n[end_effector]\npoint = "b.C"\ncoordinates = ["x", "y"]\n', "No path", "path"),
+    ('\n[path.up]\ntype = "line"\nstart = [0.0, 0.3]\nend = [0.0, 0.6]\nmax_acceleration = 10.0\n',
+     "Path up leaves the reach", "path"),
+    ("shorter", "No actuation mode", "motor"),
+    ('\n[mode]\none = ["left"]\n', "Mode one drives 1 of 2", "motor"),
+    ("second", "Ready: run mode one on path up", "run"),
+]  # fmt: skip
+POSES = {"b = 0.25": "body.b", "c = 0.98": "body.c", "d = 2.89": "body.d"}
+
+
+def grown(text, step):
+    """The text after a step."""
+    if step == "masses":
+        return text.replace("points = { ", "mass = 0.2\ninertia = 1e-3\ncentre_of_mass = [0.12, 0.0]\npoints = { ")
+    if step == "shorter":
+        return text.replace("end = [0.0, 0.6]", "end = [0.0, 0.4]")
+    if step == "second":
+        return text.replace('left = "A"', 'left = "A"\nright = "E"').replace('["left"]', '["left", "right"]')
+    text += step
+    for line, body in POSES.items():
+        if f"[{body}]" in step:
+            text = text.replace("a = 2.16\n", f"a = 2.16\n{line}\n")
+    return text
+
+
+@pytest.fixture
+def session(tmp_path):
+    """A session with the empty sheet."""
+    session = Session(Document(drafts=tmp_path), lambda _: None)
+    yield session
+    session.close()
+
+
+def ready(session, text):
+    """The sentence and the tool that a text leads to."""
+    found = session.answer({"id": 1, "do": "text", "text": text})["ok"]["ready"]
+    return found
+
+
+class TestReadiness:
+    """One sentence on what stands in the way of a run."""
+
+    def test_from_the_empty_sheet_to_a_run(self, session):
+        text = 'name = "untitled"\n'
+        for step, sentence, action in STEPS:
+            text = grown(text, step)
+            found = ready(session, text)
+            assert (found["sentence"][: len(sentence)], found["action"]) == (sentence, action), text
+            assert found["ok"] == sentence.startswith("Ready")
+        assert session.answer({"id": 2, "do": "check"})["ok"]["ok"]
+
+    @pytest.mark.parametrize("name", library_names())
+    def test_library_mechanisms_are_ready(self, session, name):
+        found = ready(session, library_text(name))
+        flexure = name in ("leaf_spring_guide", "cross_spring_pivot", "folded_beam_guide")
+        assert (found["ok"], found["action"]) == (True, "pull" if flexure else "run")
+        assert found["sentence"].startswith("Ready: pull" if flexure else "Ready: run")
+        assert session.answer({"id": 2, "do": "check"})["ok"]["ok"]
+
+    def test_a_flexure_without_statics_is_pulled(self, session):
+        assert ready(session, CANTILEVER)["sentence"] == "Ready: pull at beam.T to bend it"
+
+    def test_a_crank_without_masses_can_be_turned(self, session):
+        text = ARM.replace('[motor]\nshoulder = "A"', '[prescribed.crank]\njoint = "A"\nspeed = 2.0')
+        text = text.replace("mass = 2.0\ninertia = 0.01\n", "")
+        found = ready(session, text)
+        assert found["sentence"] == "It can be turned by its crank; for a run, give upper a mass"
+        assert found["place"] == ["body", "upper", "mass"]
+
+    def test_what_is_rigid_cannot_move(self, session):
+        joint = 'A = ["ground.A", "upper.A"]'
+        weld = joint.replace("[joint]", "").replace("A = ", "points = ")
+        text = ARM.replace(f"[joint]\n{joint}", f'[joint.A]\ntype = "weld"\n{weld}\nangle = 0.4')
+        assert ready(session, text.replace('[motor]\nshoulder = "A"', ""))["sentence"].startswith("It cannot move")
+
+    def test_open_loops_and_errors_come_first(self, session):
+        found = ready(session, library_text("five_bar").replace("l1 = 0.250", "l1 = 0.050"))
+        assert not found["ok"]
+        found = ready(session, library_text("five_bar").replace("width = 0.030", "width = -0.030"))
+        assert (found["ok"], found["place"]) == (False, ["section", "bar", "width"])
+
+    def test_a_wrong_run_is_not_let_pass(self):
+        model, _ = read(library_text("five_bar").replace("max_acceleration = 40.0", "max_acceleration = 40000.0"))
+        codes = [one for one in pf.check(model) if one.level.value == "wrong"]
+        found = checked(model)
+        assert found["ok"] == (not codes)
+        assert len(found["findings"]) > 0
+
+
+class TestMessages:
+    """Requests of the page."""
+
+    def test_force_and_linear_model(self, session):
+        ready(session, library_text("leaf_spring_guide"))
+        force = {"id": 1, "do": "force", "ref": "stage.T", "force": [1.0, 0.0]}
+        found = session.answer(force)["ok"]
+        assert found["buckling"] is not None
+        assert session.answer(force | {"buckling": False})["ok"]["deflection"] == pytest.approx(found["deflection"])
+        assert session.answer(force | {"force": []})["ok"]["stiffness"] is None
+        assert "error" in session.answer(force | {"ref": "stage.none"})
+        assert session.answer({"id": 2, "do": "linear"})["ok"]["poles"][0][2] == pytest.approx(11.3666, rel=1e-3)

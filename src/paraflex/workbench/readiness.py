@@ -37,11 +37,13 @@ def readiness(
     if gaps:
         name, gap = next(iter(gaps.items()))
         return _not(f"The loops do not close: joint {name} is open by {gap}", ["joint", name], "shape")
-    if problem is not None and getattr(problem, "field", "") != "body":
-        return _not(str(problem), _parts(str(getattr(problem, "field", ""))))
+    apart = model is not None and not (model.mechanism.joints or model.mechanism.linear_springs)
+    where = _parts(str(getattr(problem, "field", "")))
+    if problem is not None and where != ["body"] and not (apart and where[:1] == ["assembly"]):
+        return _not(str(problem), where)
     if model is None:
         return _not("Draw a link: press where it begins, and again where it ends", [], "link")
-    if not model.mechanism.joints:
+    if apart:
         return _not("Join the links: draw one that begins on another or on the ground", [], "link")
     if seen is None:
         return _not("The mechanism has no pose", ["assembly"])
