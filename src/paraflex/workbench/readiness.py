@@ -75,7 +75,7 @@ def _of_motion(model: Model, freedoms: int) -> Message | None:
         return _not(f"Choose what moves it: {drives}", [], "motor" if freedoms > 1 else "drive")
     if massless is not None:
         kind = "can be turned by its crank" if mechanism.prescribed else "can be moved by hand"
-        return _not(f"It {kind}; for a run, give {massless} a mass", ["body", massless, "mass"])
+        return _not(f"It {kind}; for a run, {massless} needs a mass", ["body", massless, "mass"])
     return _pull(model) if pulled else None
 
 
