@@ -15,7 +15,7 @@ from websockets.exceptions import ConnectionClosed, InvalidStatus
 
 from paraflex.files import library_text
 from paraflex.workbench.document import EMPTY, Document
-from paraflex.workbench.session import Session
+from paraflex.workbench.session import EditSession
 from workbenches import Talk, served
 
 FIVE_BAR = library_text("five_bar")
@@ -131,7 +131,7 @@ def test_bytes_are_no_message(address):
 
 
 def test_random_messages_never_raise(tmp_path):
-    session, random_ = Session(Document("five_bar", drafts=tmp_path), lambda _: None), random.Random(3)
+    session, random_ = EditSession(Document("five_bar", drafts=tmp_path), lambda _: None), random.Random(3)
     names = [name.removeprefix("_do_") for name in dir(session) if name.startswith("_do_")]
     values = [
         None,

@@ -17,7 +17,7 @@ from .bending import drag_force, linear
 from .document import EMPTY, Document
 from .items import fields, outline
 from .leaving import figures, film, link, report, text_of_link
-from .messages import Message, described, field, finite, numbers, one_of
+from .messages import Message, described, field, finite, keys, numbers, one_of
 from .picture import looks
 from .programs import program
 from .runs import Runner
@@ -29,7 +29,7 @@ _WITHOUT_PLACES = ("set", "unset", "rename", "delete", "pose")
 SLOW = ("leave",)
 
 
-class Session:
+class EditSession:
     """State behind all pages that show one document.
 
     Parameters
@@ -123,7 +123,7 @@ class Session:
         return {"goes": what_goes(self.document.text, field(message, "names", list))}
 
     def _do_fields(self, message: Message) -> Message:
-        return fields(self.document.text, field(message, "place", list))
+        return fields(self.document.text, keys(message, "place"))
 
     def _do_undo(self, _: Message) -> Message:
         self.document.undo()

@@ -29,7 +29,7 @@ export function modeText(name) { return /^[+-]+$/.test(name) ? name.replaceAll("
 // Round numbers within a range, about as many as asked for.
 export function roundTicks(low, high, count) {
   const rough = (high - low) / Math.max(count, 1), power = 10 ** Math.floor(Math.log10(rough));
-  const step = power * [1, 2, 5, 10].find((one) => one * power >= rough * 0.999), out = [];
+  const step = power * [1, 2, 5, 10].find((one) => one * power >= rough * 0.7), out = [];
   for (let k = Math.ceil(low / step - 1e-9); k <= high / step + 1e-9; k++) out.push(+(k * step).toPrecision(12));
   return out;
 }

@@ -44,14 +44,14 @@ export class Motion {
     this.runner = button("▶ Run", "Compute the flexible motion in all modes of the study", () => this.run(true), { class: "main" });
     this.bar = element("div", { class: "progress", role: "progressbar", "aria-label": "Progress of the run", hidden: true }, element("i", {}));
     this.chips = element("div", { class: "chips", role: "radiogroup", "aria-label": "Motion that is shown" });
-    this.results = element("span", { class: "results" });
+    this.results = element("p", { class: "results" });
     const actions = element("div", { class: "actions" }, this.turner, button("Assemblies", "All ways in which the links can be joined at this place", () => this.showAssemblies()),
       button("Linear", "Poles and frequency responses about this pose", () => this.showLinear()), new Pulling(this.bench).opener, this.runner,
-      element("label", { class: "auto", title: "Run after each change" }, this.auto, "auto"), this.bar, this.results);
+      element("label", { class: "auto", title: "Run after each change" }, this.auto, "auto"), this.bar);
     this.tools = this.makeTools();
     this.news = element("p", { class: "news" });
     this.drawer = this.makeDrawer();
-    this.bench.parts.dock.append(this.drawer, this.player, this.tools, actions, this.news);
+    this.bench.parts.dock.append(this.drawer, this.player, this.tools, actions, this.results, this.news);
   }
 
   // Magnification and colours of stress, shown where links bend.

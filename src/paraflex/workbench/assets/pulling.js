@@ -57,6 +57,7 @@ export class Pulling {
   }
 
   moved([px, py]) {
+    this.bench.tools.under = null;
     const [ax, ay] = this.sheet.px(...this.at), scale = Number(this.size.value) / 100;
     this.move([scale * (px - ax), scale * (ay - py)]);
   }

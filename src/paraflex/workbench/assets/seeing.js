@@ -19,19 +19,19 @@ export class Seeing {
     for (const what of ["state", "picture"]) bench.on(what, () => this.show());
     bench.on("picture", () => this.follow());
     this.sheet.under.push((pen) => this.paintUnder(pen));
-    this.sheet.over.push((pen) => this.paintLegend(pen));
+    this.sheet.over.push((pen) => this.paintOver(pen));
   }
-
-  // Whether only what is computed fast belongs to the pose that is seen.
-  get isDragged() { return !!this.bench.tools?.held?.sent; }
 
   show() {
     const { seen } = this.bench.state;
+    // Quick numbers of a drag keep the chips, and all that takes longer, of the pose before.
+    if (seen !== this.seen) [this.old, this.seen] = [!!seen && seen.chips === this.seen?.chips, seen];
     this.panel.hidden = !seen;
     if (!seen) return;
-    const why = seen.why ?? {}, old = this.isDragged;
+    const why = seen.why ?? {}, { old } = this;
+    this.given = new Set();
     this.put("freedoms", "Degrees of freedom", freedomsText(seen), why.freedoms);
-    this.put("condition", "Condition number", seen.condition === null || seen.condition === undefined ? "" : shortNumber(seen.condition, 3), why.condition ?? "no task that these motors drive", false, "Largest by smallest effort in the task per torque of these motors; 1 is best");
+    this.put("condition", "Condition number", seen.condition === null || seen.condition === undefined ? "" : shortNumber(seen.condition, 3), seen.freedoms ? why.condition ?? "no task that these motors drive" : "", false, "Largest by smallest effort in the task per torque of these motors; 1 is best");
     this.bars(seen);
     this.put("held", "Frequencies, held", frequencies(seen.held), why.held, old, "Lowest natural frequencies with all motors held");
     this.put("unheld", "Frequencies, free", frequencies(seen.unheld), why.unheld ?? why.held, old, "Lowest natural frequencies with free motors");
@@ -43,14 +43,15 @@ export class Seeing {
   // Sliding joints take forces.
   unitOf(motor) { return this.bench.state.picture?.joints.find((one) => one[4] === motor)?.[1] === "prismatic" ? "N" : "N m"; }
 
-  // A row; without a value the reason for it in grey, and no row without a reason.
+  // A row; without a value the reason for it in grey, and no row without a reason or for one that was given before.
   put(key, label, text, why = "", old = false, help = "") {
     if (!this.rows.has(key)) {
       const term = element("dt", { title: help }, label), value = element("dd", { "data-number": key });
       this.list.append(term, value);
       this.rows.set(key, { term, value });
     }
-    const { term, value } = this.rows.get(key), shown = text || why || "";
+    const { term, value } = this.rows.get(key), shown = text || (this.given.has(why) ? "" : why) || "";
+    if (!text) this.given.add(why);
     term.hidden = value.hidden = !shown;
     if (value.textContent !== shown) value.textContent = shown;
     value.title = shown;
@@ -93,7 +94,7 @@ export class Seeing {
   // Trails of joints and the end-effector while the mechanism is dragged.
   follow() {
     const { picture } = this.bench.state;
-    if (!this.isDragged || !picture) return;
+    if (!this.bench.tools?.held?.sent || !picture) return;
     const now = performance.now(), places = picture.joints.map(([name, , x, y]) => [`joint ${name}`, x, y]), effector = picture.points.find(([ref]) => ref === picture.effector);
     if (effector) places.push(["effector", effector[1], effector[2]]);
     for (const [key, x, y] of places) {
@@ -148,9 +149,15 @@ export class Seeing {
     pen.setLineDash([]);
   }
 
+  paintOver(pen) {
+    if (!this.isPosed) return;
+    if (this.bench.state.seen?.compliance) this.paintSize(pen, this.bench.state.seen.compliance);
+    this.paintLegend(pen);
+  }
+
   paintLegend(pen) {
     const path = this.bench.state.seen?.path ?? [];
-    if (!this.isPosed || !path.length) return;
+    if (!path.length) return;
     const used = REACHES.map((one, reach) => [one, reach]).filter(([, reach]) => path.some((place) => place[2] === reach));
     pen.font = "12px system-ui, sans-serif"; pen.textBaseline = "middle"; pen.textAlign = "right";
     let y = this.sheet.height - 16;
@@ -169,16 +176,23 @@ export class Seeing {
     const { picture } = this.bench.state, at = picture.points.find(([ref]) => ref === picture.effector);
     if (!at || !(large > 0)) return;
     const [px, py] = this.sheet.px(at[1], at[2]), b = Math.max((ELLIPSE * small) / large, 1), c = Math.cos(angle), s = Math.sin(angle);
-    pen.globalAlpha = this.isDragged ? 0.3 : 1;
+    pen.globalAlpha = this.old ? 0.3 : 1;
     pen.strokeStyle = pen.fillStyle = this.sheet.colour("good"); pen.lineWidth = 1.6;
     pen.beginPath(); pen.ellipse(px, py, ELLIPSE, b, -angle, 0, 2 * Math.PI); pen.stroke();
     pen.globalAlpha *= 0.13; pen.fill(); pen.globalAlpha /= 0.13;
     pen.lineWidth = 1; pen.setLineDash([3, 3]);
     pen.beginPath(); pen.moveTo(px - ELLIPSE * c, py + ELLIPSE * s); pen.lineTo(px + ELLIPSE * c, py - ELLIPSE * s); pen.moveTo(px - b * s, py - b * c); pen.lineTo(px + b * s, py + b * c); pen.stroke();
     pen.setLineDash([]);
-    if (this.isDragged) { pen.globalAlpha = 1; return; }
+    pen.globalAlpha = 1;
+  }
+
+  // Its larger semi-axis, written over the links.
+  paintSize(pen, { sizes: [large], angle }) {
+    const { picture } = this.bench.state, at = picture.points.find(([ref]) => ref === picture.effector);
+    if (!at || !(large > 0) || this.old) return;
+    const [px, py] = this.sheet.px(at[1], at[2]), c = Math.cos(angle), s = Math.sin(angle);
     const side = c < 0 ? -1 : 1, x = px + side * (ELLIPSE + 6) * c, y = py - side * (ELLIPSE + 6) * s;
-    pen.font = "11.5px system-ui, sans-serif"; pen.textBaseline = "middle"; pen.textAlign = Math.abs(c) > 0.3 ? "left" : "center"; pen.lineWidth = 4; pen.strokeStyle = this.sheet.colour("card");
+    pen.font = "11.5px system-ui, sans-serif"; pen.textBaseline = "middle"; pen.textAlign = Math.abs(c) > 0.3 ? "left" : "center"; pen.lineWidth = 4; pen.strokeStyle = this.sheet.colour("card"); pen.fillStyle = this.sheet.colour("good");
     const text = quantity(large, "m/N");
     pen.strokeText(text, x, y); pen.fillText(text, x, y);
   }
