@@ -166,6 +166,8 @@ export class Motion {
   take(recording, { play = true } = {}) {
     this.recordings[recording.kind] = recording;
     this.choose(recording.kind, this.kind === recording.kind ? this.index : -1, play);
+    // The space bar then pauses, and does not press the same button again.
+    if ([this.runner, this.turner, document.body].includes(document.activeElement)) this.go.focus({ preventScroll: true });
   }
 
   // Show a motion: the turn, or a run by its number (-1 for that of the chosen mode).
