@@ -26,7 +26,11 @@ STEPS, RADIUS = 240, 40.0
 COUNT = """() => {
     const { link, sheet } = workbench, ask = link.ask.bind(link);
     window.counted = { updates: 0, frames: sheet.frames, began: performance.now() };
-    link.ask = (what, fields) => { const reply = ask(what, fields); if (what === "drag") reply.then(() => counted.updates++); return reply; };
+    link.ask = (what, fields) => {
+        const reply = ask(what, fields);
+        if (what === "drag") reply.then(() => counted.updates++);
+        return reply;
+    };
     window.stopCounting = () => {
         const seconds = (performance.now() - counted.began) / 1000;
         link.ask = ask;
@@ -41,8 +45,9 @@ CHANGE = """async ([place, text]) => {
 }"""
 RUN = """async () => {
     const began = performance.now();
+    const seconds = () => (performance.now() - began) / 1000;
     const done = new Promise((resolve, reject) => workbench.link.on("run", (event) => {
-        if (event.state === "done" || event.state === "preview") resolve([event.state, (performance.now() - began) / 1000]);
+        if (event.state === "done" || event.state === "preview") resolve([event.state, seconds()]);
         if (event.state === "error") reject(new Error(event.text));
     }));
     await workbench.link.ask("run", {});
@@ -68,7 +73,8 @@ def measured(page: Any, model: str, repeats: int) -> dict[str, Any]:
                 for (let k = 0; k <= steps; k++) {
                     const angle = 4 * Math.PI * k / steps;
                     const at = { clientX: x + radius * Math.sin(angle), clientY: y + radius * (1 - Math.cos(angle)) };
-                    canvas.dispatchEvent(new PointerEvent("pointermove", { ...at, buttons: 1, pointerId: 1, bubbles: true }));
+                    const moved = { ...at, buttons: 1, pointerId: 1, bubbles: true };
+                    canvas.dispatchEvent(new PointerEvent("pointermove", moved));
                     await new Promise((resolve) => setTimeout(resolve, 8));
                 }
             }""",

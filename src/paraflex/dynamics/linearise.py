@@ -101,51 +101,77 @@ def natural_frequencies(
     count : int, optional
         Number of the lowest vibrations; all by default, or ten for more than 600 coordinates.
     """
-    M, K, C, elastic, typical, acceleration = _about(system, state, held, torque_at)
-    if system.n <= DENSE_COORDINATES:
-        squares, shapes = all_modes(K, M, C, elastic, typical)
-    else:
-        freedoms = system.n - dependence(system, state.q).rank
-        squares, shapes, _ = slowest(K, M, C, typical, LOWEST if count is None else count, freedoms)
-    kept = slice(squares.size if count is None else count)
-    complete = system.n <= DENSE_COORDINATES and (count is None or count >= squares.size)
-    return Vibration(squares[kept], shapes[:, kept], acceleration, complete)
+    return vibration_about(system, state, pose_matrices(system, state, [*held, *torque_at]), held, count=count)
 
 
-def compliance(system: System, state: State, held: Sequence[str], rows: Array) -> Array:
-    """Return the displacements (k, k) of points by unit forces there, about a pose with joints held.
+class PoseMatrices(NamedTuple):
+    """Matrices of small vibrations about a pose, for any choice of held joints.
 
-    Parameters
+    Attributes
     ----------
-    system, state, held
-        See `natural_frequencies`.
-    rows : (k, n) array
-        Derivatives of the points' positions by the coordinates.
+    mass, stiffness : (n, n) sparse matrices
+        Mass and stiffness, that of beams included.
+    rows : (m, n) sparse matrix
+        Constraint rows Phi_q.
+    elastic : (n,) array
+        Diagonal stiffness of beams.
+    typical : float
+        Reference for squared frequencies [rad^2/s^2].
+    acceleration : float
+        Acceleration after release: see `Vibration`.
     """
-    _, K, C, *_ = _about(system, state, held, ())
-    return rows @ Saddle(K, C).solve(rows.T, np.zeros((C.shape[0], len(rows))))[0]
 
-
-class _Linear(NamedTuple):
-    """Mass, stiffness and constraint matrices about a pose, stiffness of beams, typical square, and acceleration."""
-
-    M: Sparse
-    K: Sparse
-    C: Sparse
+    mass: Sparse
+    stiffness: Sparse
+    rows: Sparse
     elastic: Array
     typical: float
     acceleration: float
 
 
-def _about(system: System, state: State, held: Sequence[str], torque_at: Sequence[str]) -> _Linear:
-    """Return the matrices about a pose whose joints are held, or have motors of constant torque."""
+@solvable("natural frequencies")
+def pose_matrices(system: System, state: State, motors: Sequence[str]) -> PoseMatrices:
+    """Return the matrices of small vibrations about a pose at rest, held there by motors at joints."""
     M, J = sparse_mass(system, state.q), sparse_jacobian(system, state.q)
-    efforts = sparse_joint_rows(system, dict.fromkeys([*held, *torque_at]), state.q)
+    efforts = sparse_joint_rows(system, dict.fromkeys(motors), state.q)
     lam, _, acceleration = forces_at_rest(system, state, M, J, efforts)
     elastic, other = stiffness_diagonal(system), pose_stiffness(system, state.time, state.q, lam)
-    C = scipy.sparse.csr_matrix(scipy.sparse.vstack([J, sparse_joint_rows(system, dict.fromkeys(held), state.q)]))
+    typical = typical_square(elastic, other, M)
     K = scipy.sparse.csr_matrix(other + scipy.sparse.diags(elastic))
-    return _Linear(M, K, C, elastic, typical_square(elastic, other, M), acceleration)
+    return PoseMatrices(M, K, J, elastic, typical, acceleration)
+
+
+@solvable("natural frequencies")
+def vibration_about(
+    system: System, state: State, at: PoseMatrices, held: Sequence[str], *, count: int | None = None
+) -> Vibration:
+    """Compute the small vibrations of `pose_matrices` with joints held; see `natural_frequencies`."""
+    rows = sparse_joint_rows(system, dict.fromkeys(held), state.q)
+    C = scipy.sparse.csr_matrix(scipy.sparse.vstack([at.rows, rows]))
+    if system.n <= DENSE_COORDINATES:
+        squares, shapes = all_modes(at.stiffness, at.mass, C, at.elastic, at.typical)
+    else:
+        freedoms = system.n - dependence(system, state.q).rank
+        many = LOWEST if count is None else count
+        squares, shapes, _ = slowest(at.stiffness, at.mass, C, at.typical, many, freedoms)
+    kept = slice(squares.size if count is None else count)
+    complete = system.n <= DENSE_COORDINATES and (count is None or count >= squares.size)
+    return Vibration(squares[kept], shapes[:, kept], at.acceleration, complete)
+
+
+def compliance(system: System, state: State, at: PoseMatrices, held: Sequence[str], rows: Array) -> Array:
+    """Return the displacements (k, k) of points by unit forces there, about a pose with joints held.
+
+    Parameters
+    ----------
+    system, state, at, held
+        See `vibration_about`.
+    rows : (k, n) array
+        Derivatives of the points' positions by the coordinates.
+    """
+    joints = sparse_joint_rows(system, dict.fromkeys(held), state.q)
+    C = scipy.sparse.csr_matrix(scipy.sparse.vstack([at.rows, joints]))
+    return rows @ Saddle(at.stiffness, C).solve(rows.T, np.zeros((system.m + len(dict.fromkeys(held)), len(rows))))[0]
 
 
 def slowest_deflection(system: System, q: Array) -> float:

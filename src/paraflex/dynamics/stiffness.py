@@ -91,6 +91,10 @@ def pose_stiffness(system: System, time: float, q: Array, lam: Array) -> scipy.s
         Multipliers of constraints and torques of springs at joints at that pose.
     """
     still, acting = np.zeros(system.n), np.zeros(inputs_of(system.mechanism).acting)
-    without_beams = replace(system, packed=without_stiffness(system.packed))
-    K = Tangency(without_beams).at(MotionPoint(time, q, still, still, lam, acting)).stiffness
+    tangency = system.once(
+        "tangency without beams", lambda: Tangency(replace(system, packed=without_stiffness(system.packed)))
+    )
+    point = MotionPoint(time, q, still, still, lam, acting)
+    # Torques of springs, dampers and friction at joints take more columns.
+    K = tangency.stiffness(point) if np.all(system.constrained) else tangency.at(point).stiffness
     return scipy.sparse.csr_matrix(0.5 * (K + K.T))

@@ -14,6 +14,8 @@ from .dependents import Use, falling, replaced, spelt, thing_of, uses
 from .edits import renamed, with_value, written
 from .sheet import XY, Action, Done, Sheet, check_name, near, placed, tidy
 
+# Length by which the inertia of a block is that of a rod [m].
+_BLOCK = 0.05
 # Members that are copied together with the joints and points that they name.
 _COPIED = ("joint", "spring", "damper", "friction", "linear_spring", "load", "sensor")
 
@@ -32,6 +34,8 @@ def set_value(sheet: Sheet, action: Action) -> Done:
     for point in _at_end(sheet, place):
         sheet = sheet.with_text(with_value(sheet.text, point, text))
     after = sheet.with_text(with_value(sheet.text, place, text))
+    if place[0] == "body" and place[2:] == ("mass",) and value_at(sheet.data, (*place[:2], "inertia")) is None:
+        after = _with_inertia(after, place[:2])
     return placed(before, after), ".".join(map(str, place[:2]))
 
 
@@ -61,6 +65,20 @@ def _at_end(sheet: Sheet, place: Place) -> list[Place]:
         return []
     length = sheet.number(place)
     return [(*place[:2], "points", name) for name in points if sheet.number((*place[:2], "points", name)) == length]
+
+
+def _with_inertia(sheet: Sheet, body: Place) -> Sheet:
+    """Give a rigid body the centre of mass and the inertia of a thin rod along its points, if it has none."""
+    table = value_at(sheet.data, body)
+    if table.get("type", "rigid") != "rigid":
+        return sheet
+    points = [tuple(sheet.number((*body, "points", name, k)) for k in (0, 1)) for name in table.get("points", {})]
+    length = max((dist(one, other) for one in points for other in points), default=0.0) or _BLOCK
+    inertia = sheet.number((*body, "mass")) * length**2 / 12.0
+    centre = [sum(each) / len(points) for each in zip(*points, strict=True)] if points else [0.0, 0.0]
+    if "centre_of_mass" not in table and any(centre):
+        sheet = sheet.put((*body, "centre_of_mass"), centre)
+    return sheet.put((*body, "inertia"), inertia)
 
 
 def unset(sheet: Sheet, action: Action) -> Done:

@@ -45,7 +45,7 @@ class Dragging:
     system : System
         System of the rigid mechanism without prescribed motions.
     signals : Signals
-        Its signals.
+        Signals of prescribed motions.
     freedoms : int
         Degrees of freedom.
     at : int

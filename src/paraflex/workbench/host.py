@@ -20,7 +20,7 @@ from starlette.websockets import WebSocket, WebSocketDisconnect
 from .document import Document
 from .messages import finite
 from .page import module, page, style
-from .session import SLOW, Session
+from .session import SLOW, EditSession
 
 # Largest message [bytes], time without a page after which the server ends, and time between two looks at the file [s].
 _LARGEST, _ALONE, _LOOK = 8_000_000, 4.0, 0.3
@@ -59,7 +59,7 @@ class Host:
         # One thread for all messages: they are answered in their order.
         self._worker = ThreadPoolExecutor(1, thread_name_prefix="workbench")
         self._slow = ThreadPoolExecutor(1, thread_name_prefix="workbench-slow")
-        self.session = Session(document, self._send)
+        self.session: EditSession = EditSession(document, self._send)
         self._server = uvicorn.Server(uvicorn.Config(self._app(), **_SERVING))
 
     @property

@@ -40,6 +40,14 @@ def numbers(message: Any, name: str, count: int) -> list[float]:
     return [float(one) for one in found]
 
 
+def keys(message: Any, name: str) -> list[str | int]:
+    """Return a field of a message that is a place in the file: keys and indices; see `field` for the errors."""
+    found = field(message, name, list)
+    if not all(isinstance(one, str | int) for one in found):
+        raise InputError("is not a list of names", field=name, value=str(found)[:60], remedy="load the page again")
+    return found
+
+
 def one_of(value: str, choices: Sequence[str]) -> str:
     """Return a word of a message that is one of the choices; InputError otherwise."""
     if value not in choices:

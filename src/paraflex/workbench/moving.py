@@ -11,7 +11,7 @@ from paraflex.arrays import Array
 from paraflex.driven.assemblies import poses_of
 from paraflex.driven.exact import NO_TASKS
 from paraflex.driven.ranges import JointDrive
-from paraflex.dynamics import material_angle, reference_pose
+from paraflex.dynamics import System, material_angle, reference_pose
 from paraflex.dynamics.joint_coordinates import joint_rows, joint_value
 from paraflex.dynamics.points import marker_position
 from paraflex.dynamics.projection import assemble, closed, constraint_change
@@ -112,6 +112,10 @@ class Mover:
     """
 
     q: Array
+    freedoms: int
+    mechanism: Mechanism
+    loops: LoopClosure
+    system: System
 
     def __init__(self, mechanism: Mechanism, assembly: str | None = None) -> None:
         self._take(mechanism)

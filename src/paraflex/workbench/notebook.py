@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 from paraflex.errors import InputError
 from .document import Document
 from .page import module, style
-from .session import Session
+from .session import EditSession
 
 if TYPE_CHECKING:
     from paraflex.files import Model
@@ -41,7 +41,7 @@ def edit(model: Model | Mechanism | str | Path | None = None) -> Any:
 
         def __init__(self, document: Document) -> None:
             super().__init__()
-            self.session = Session(document, self.send)
+            self.session = EditSession(document, self.send)
             self.on_msg(lambda _, message, __: self.send(self.session.answer(message)))
 
         @property

@@ -1,10 +1,14 @@
-"""One sentence on what stands in the way of a run, and where to mend it."""
+"""One sentence on what stands in the way of a run, and where to correct it."""
 
 from typing import Any
 
+from paraflex.checks import check
+from paraflex.equilibria import StaticsDefaults
 from paraflex.errors import ParaflexError
 from paraflex.files import Model
+from paraflex.findings import Level
 from paraflex.mechanism import RigidBody
+from paraflex.results.findings import finding_lines
 from .messages import Message
 
 
@@ -27,57 +31,102 @@ def readiness(
     Returns
     -------
     dict
-        `ok`, whether it can run; `sentence`; and where to go: `place` in the file, and `action`, the tool to take.
+        `ok`, whether it can run; `sentence`; and where to go: `place` in the file, and `action`, the tool to take, or
+        "run", or "pull" for a mechanism that a force bends.
     """
     if gaps:
         name, gap = next(iter(gaps.items()))
         return _not(f"The loops do not close: joint {name} is open by {gap}", ["joint", name], "shape")
     if problem is not None and getattr(problem, "field", "") != "body":
-        return _not(str(problem), _place(problem))
+        return _not(str(problem), _parts(str(getattr(problem, "field", ""))))
     if model is None:
         return _not("Draw a link: press where it begins, and again where it ends", [], "link")
-    mechanism = model.mechanism
-    if not mechanism.joints:
+    if not model.mechanism.joints:
         return _not("Join the links: draw one that begins on another or on the ground", [], "link")
-    massless = next((one.name for one in mechanism.bodies if isinstance(one, RigidBody) and not one.mass), None)
     if seen is None:
         return _not("The mechanism has no pose", ["assembly"])
-    if not mechanism.motors and not mechanism.prescribed and not mechanism.loads:
-        return _not("Choose what moves it: a motor, or the crank that turns", [], "drive")
+    return _of_motion(model, int(seen["freedoms"])) or _of_study(model, seen)
+
+
+def checked(model: Model, ready: Message) -> Message:
+    """Return what `readiness` found, corrected by all checks of `paraflex info`, which take longer than an edit may.
+
+    A model whose run would be wrong is not ready. `findings` has a line for each finding.
+    """
+    verdict = check(model)
+    ready = {**ready, "findings": finding_lines(verdict)}
+    wrong = next((one for one in verdict if one.level is Level.WRONG), None)
+    if wrong is None or not ready["ok"]:
+        return ready
+    return {**ready, **_not(f"{wrong.place}: {wrong.text}; {wrong.remedy}", _parts(wrong.place))}
+
+
+def _of_motion(model: Model, freedoms: int) -> Message | None:
+    """Return what keeps a mechanism from moving, or that a force bends it; None if it moves."""
+    mechanism = model.mechanism
+    driven = bool(mechanism.motors or mechanism.prescribed)
+    flexible = any(not isinstance(body, RigidBody) and body.flexible for body in mechanism.bodies)
+    massless = next((one.name for one in mechanism.bodies if isinstance(one, RigidBody) and not one.mass), None)
+    if not freedoms and not flexible:
+        return _not("It cannot move: it has no degree of freedom, so remove a link or a joint", ["joint"])
+    pulled = not driven and (not freedoms or model.statics != StaticsDefaults())
+    if not pulled and not driven and not _moves_itself(model):
+        drives = f"{freedoms} motors" if freedoms > 1 else "a motor, or the crank that turns"
+        return _not(f"Choose what moves it: {drives}", [], "motor" if freedoms > 1 else "drive")
     if massless is not None:
-        kind = "the crank can be turned" if mechanism.prescribed else "it can be moved by hand"
-        return _not(f"No masses yet, so {kind}; give {massless} a mass for a run", ["body", massless, "mass"])
-    if mechanism.motors and not mechanism.prescribed and not mechanism.loads and model.start is None:
-        if mechanism.end_effector is None:
-            return _not("No end-effector: choose the point that is to follow a path", [], "effector")
-        if not model.paths:
-            return _not("No path: draw the one that the end-effector is to follow", [], "path")
-    return _of_study(model, seen)
+        kind = "can be turned by its crank" if mechanism.prescribed else "can be moved by hand"
+        return _not(f"It {kind}; for a run, give {massless} a mass", ["body", massless, "mass"])
+    return _pull(model) if pulled else None
+
+
+def _moves_itself(model: Model) -> bool:
+    mechanism = model.mechanism
+    forced = mechanism.loads or mechanism.springs or mechanism.linear_springs or any(mechanism.gravity)
+    return bool(forced) or model.start is not None
+
+
+def _pull(model: Model) -> Message:
+    effector, duration = model.mechanism.end_effector, model.study.duration
+    where = "a link" if effector is None else str(effector.point)
+    run = "" if duration is None else f", or run {duration:g} s"
+    return _ready(f"pull at {where} to bend it{run}", "pull")
 
 
 def _of_study(model: Model, seen: Message) -> Message:
     if model.paths:
-        name = model.path_name()
-        beyond = [one for one in seen.get("path") or [] if not one[2]]
-        if beyond:
-            return _not(f"Path {name} leaves the reach of the mechanism", ["path", name], "path")
-        lacking = [one for one in seen.get("chips") or [] if one["lacks"]]
-        runs = [mode.name for mode in model.modes()]
-        short = next((one for one in lacking if one["name"] in runs), None)
-        if short is not None and len(lacking) >= len(runs):
-            return _not(f"Mode {short['name']} {short['lacks']}: add a motor", ["mode", short["name"]], "motor")
-        if not runs:
-            return _not("No actuation mode: add motors to a mode", ["mode"], "motor")
-        count = f"{len(runs)} modes" if len(runs) > 1 else f"mode {runs[0]}"
-        return {"ok": True, "sentence": f"Ready: run {count} on path {name}", "place": [], "action": "run"}
-    if model.study.duration is None:
-        return _not("No duration: give the time of the run", ["study"])
-    return {"ok": True, "sentence": f"Ready: run {model.study.duration:g} s", "place": [], "action": "run"}
+        return _of_path(model, seen, model.path_name())
+    if model.study.duration is not None:
+        return _ready(f"run {model.study.duration:g} s")
+    if not model.mechanism.motors:
+        return _not("No duration: give the time of the run", ["study", "duration"])
+    if model.mechanism.end_effector is None:
+        return _not("No end-effector: choose the point that is to follow a path", [], "effector")
+    return _not("No path: draw the one that the end-effector is to follow", [], "path")
+
+
+def _of_path(model: Model, seen: Message, name: str) -> Message:
+    if model.mechanism.end_effector is None:
+        return _not("No end-effector: choose the point that is to follow the path", [], "effector")
+    if not all(reach for _, _, reach in seen.get("path") or []):
+        return _not(f"Path {name} leaves the reach of the mechanism", ["path", name], "path")
+    runs = [mode.name for mode in model.modes()]
+    if not runs:
+        return _not("No actuation mode: add motors", ["mode"], "motor")
+    lacks = {one["name"]: one["lacks"] for one in seen.get("chips") or []}
+    short = [one for one in runs if lacks.get(one)]
+    if len(short) == len(runs):
+        return _not(f"Mode {short[0]} {lacks[short[0]]}: add a motor", ["mode", short[0]], "motor")
+    return _ready(f"run {f'{len(runs)} modes' if len(runs) > 1 else f'mode {runs[0]}'} on path {name}")
+
+
+def _ready(sentence: str, action: str = "run") -> Message:
+    return {"ok": True, "sentence": f"Ready: {sentence}", "place": [], "action": action}
 
 
 def _not(sentence: str, place: list[Any], action: str = "") -> Message:
     return {"ok": False, "sentence": sentence, "place": place, "action": action}
 
 
-def _place(problem: ParaflexError) -> list[Any]:
-    return [int(part) if part.isdigit() else part for part in str(getattr(problem, "field", "")).split(".") if part]
+def _parts(place: str) -> list[Any]:
+    """Return a place in the file as keys."""
+    return [int(part) if part.isdigit() else part for part in place.split(".") if part]

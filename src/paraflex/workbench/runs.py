@@ -174,7 +174,10 @@ class _Process:
     """Process of `worker.main`, with a thread that reads its events."""
 
     def __init__(self, runner: Runner) -> None:
-        self.ready, self.busy, self.begun, self._runner = False, False, NO_REQUEST, runner
+        self.ready: bool = False
+        self.busy: bool = False
+        self.begun: int = NO_REQUEST
+        self._runner = runner
         command = [sys.executable, "-c", _CHILD.format(path=sys.path)]
         with starting_processes():
             self.process: Any = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE)

@@ -10,15 +10,16 @@ import numpy as np
 
 from paraflex.actuation import actuation_condition, required_effort
 from paraflex.arrays import Array, ArrayLike, Mask
-from paraflex.dynamics import System, build_system, natural_frequencies, undeformed
+from paraflex.dynamics import System, acting_loads, build_system, undeformed
 from paraflex.dynamics.joint_coordinates import joint_rows
-from paraflex.dynamics.linearise import LOWEST, compliance
+from paraflex.dynamics.linearise import LOWEST, PoseMatrices, compliance, pose_matrices, vibration_about
 from paraflex.dynamics.points import marker_place
 from paraflex.dynamics.state import State
 from paraflex.dynamics.stiffness import RestingForces
 from paraflex.errors import InputError, NumericalError, ParaflexError
 from paraflex.files import Model
-from paraflex.mechanism import Mechanism
+from paraflex.mechanism import ActuationMode, Mechanism
+from paraflex.mechanism.masses import check_masses, with_any_masses
 from paraflex.paths import Path
 from paraflex.paths.closure import PathClosure, RigidMotion, follow_path
 
@@ -52,7 +53,7 @@ class Seeing:
 
     @cached_property
     def _rigid(self) -> System:
-        return build_system(self._mechanism.rigid())
+        return build_system(with_any_masses(self._mechanism).rigid())
 
     @cached_property
     def _flexible(self) -> System:
@@ -62,10 +63,15 @@ class Seeing:
     def massless(self) -> str:
         """Reason why nothing that depends on masses is known; empty if it is known."""
         try:
-            _ = self._rigid
+            check_masses(self._mechanism)
         except InputError as error:
             return f"{error.field} {error.problem.partition(',')[0]}"
         return ""
+
+    def holds(self, q: Array) -> bool:
+        """Return whether motors and prescribed motions hold all degrees of freedom in a rigid pose (n,)."""
+        free, joints = self._free(q), [*self._joint.values(), *self._drives]
+        return _rank(self._scaled(joint_rows(self._rigid, joints, q)) @ free) == free.shape[1]
 
     def quick(self, q: Array, mode: str) -> dict[str, Any]:
         """Return the numbers of a rigid pose (n,) that follow a drag.
@@ -74,11 +80,10 @@ class Seeing:
         effort in the task by these motors (`actuation.actuation_condition`); `serial` and `parallel`, ratios of the
         smallest to the largest singular value of the velocities of the end-effector and of the motors, by all motions
         of unit length, zero in singular positions of types I and II; `torques`, those of least norm that hold gravity,
-        springs and loads at rest [N m, N]; and `why`, reasons for those that are None.
+        springs and loads of t = 0 at rest [N m, N], by motors and by joints of prescribed motions; and `why`, reasons
+        for those that are None. A positive torque acts on the second body of its joint.
         """
         why: dict[str, str] = {}
-        if self.massless:
-            return {"freedoms": None, "mode": mode, "why": {"freedoms": "", "torques": self.massless}}
         motors, free = self._motors(mode), self._free(q)
         by_motors, by_task = self._moved(q, motors, free)
         found = {"freedoms": free.shape[1], "mode": mode, "drives": int(_rank(by_motors))}
@@ -98,9 +103,10 @@ class Seeing:
         free = self._free(q)
         by_motors, by_task = self._moved(q, motors, free)
         count = free.shape[1]
+        task = 0 if by_task is None else min(len(by_task), count)
         return {
-            "parallel": _ratio(by_motors, count) if len(by_motors) and count else None,
-            "serial": _ratio(by_task, count) if by_task is not None and count else None,
+            "parallel": _ratio(by_motors, count) if len(by_motors) >= count > 0 else None,
+            "serial": None if by_task is None or not task else _ratio(by_task, task),
         }
 
     def full(self, q: Array, mode: str) -> dict[str, Any]:
@@ -119,30 +125,32 @@ class Seeing:
         try:
             state = undeformed(self._flexible, self._rigid, State(0.0, q, np.zeros(self._rigid.n)))
             held = list(dict.fromkeys([*self._joint.values(), *self._drives]))
-            found["held"] = self._frequencies(state, held, []) if held else None
-            motors = [one for one in held if one not in self._drives]
-            found["unheld"] = self._frequencies(state, self._drives, motors) if motors or not held else None
-            found["compliance"] = self._compliance(q, state, held, why)
+            at = pose_matrices(self._flexible, state, held)
+            found["held"] = self._frequencies(state, at, held) if held else None
+            free = len(held) > len(self._drives) or not held
+            found["unheld"] = self._frequencies(state, at, self._drives) if free else None
+            found["compliance"] = self._compliance(q, state, at, held, why)
         except (InputError, NumericalError) as error:
             why["held"] = str(error)
         return found
 
-    def _frequencies(self, state: State, held: Sequence[str], torque_at: Sequence[str]) -> list[float]:
-        found = natural_frequencies(self._flexible, state, held, torque_at=torque_at, count=LOWEST)
+    def _frequencies(self, state: State, at: PoseMatrices, held: Sequence[str]) -> list[float]:
+        found = vibration_about(self._flexible, state, at, held, count=LOWEST)
         return [float(omega) / (2.0 * np.pi) for omega in found.frequencies if omega > 0.0][:_SHOWN]
 
-    def _compliance(self, q: Array, state: State, held: list[str], why: dict[str, str]) -> dict[str, Any] | None:
+    def _compliance(
+        self, q: Array, state: State, at: PoseMatrices, held: list[str], why: dict[str, str]
+    ) -> dict[str, Any] | None:
         rows = self._task(self._flexible, state.q, place=True)
         if rows is None or not self._flexible.n_flexible:
             why["compliance"] = "no end-effector" if rows is None else "no flexible link"
             return None
-        free = self._free(q)
-        if _rank(self._scaled(joint_rows(self._rigid, held, q)) @ free) < free.shape[1]:
+        if not self.holds(q):
             why["compliance"] = "the motors do not hold the mechanism"
             return None
-        found = compliance(self._flexible, state, held, rows)
+        found = compliance(self._flexible, state, at, held, rows)
         sizes, axes = np.linalg.eigh(0.5 * (found + found.T))
-        return {"sizes": [float(sizes[1]), float(sizes[0])], "angle": float(np.arctan2(axes[1, 1], axes[0, 1]))}
+        return {"sizes": [float(sizes[1]), float(sizes[0])], "angle": float(np.arctan2(axes[1, 1], axes[0, 1]) % np.pi)}
 
     def _motors(self, mode: str) -> tuple[str, ...]:
         chosen = [one.motors for one in self._mechanism.modes if one.name == mode]
@@ -175,10 +183,13 @@ class Seeing:
     def _holding(
         self, q: Array, free: Array, by_motors: Array, names: list[str], why: dict[str, str]
     ) -> dict[str, float] | None:
-        system, lam = self._rigid, np.zeros(self._rigid.m)
+        if self.massless:
+            why["torques"] = self.massless
+            return None
+        system = self._rigid
         forces = RestingForces(system, 0.0)
-        lam[forces.springs] = forces(q, lam)[1] / system.packed.rows["compliance"][forces.springs]
-        needed = free.T @ (system.units * forces(q, lam)[0])
+        forces.torques = acting_loads(system.mechanism, np.zeros(1))[0]
+        needed = free.T @ (system.units * forces(q, forces.compliant(q))[0])
         torques = np.linalg.pinv(by_motors.T) @ needed
         left = float(np.max(np.abs(by_motors.T @ torques - needed), initial=0.0))
         if left > 1e-9 * max(1.0, float(np.max(np.abs(needed), initial=0.0))):
@@ -188,11 +199,9 @@ class Seeing:
 
     def _chips(self, q: Array) -> list[dict[str, Any]]:
         """Return the modes with what their motors drive at a pose."""
-        if self.massless or not self._mechanism.modes:
-            return []
         free, out = self._free(q), []
         for mode in self._mechanism.modes:
-            joints = [self._joint[name] for name in mode.motors]
+            joints = [*(self._joint[name] for name in mode.motors), *self._drives]
             driven, freedoms = _rank(self._scaled(joint_rows(self._rigid, joints, q)) @ free), free.shape[1]
             lacks = f"drives {driven} of {freedoms} degrees of freedom" if driven < freedoms else ""
             out.append({"name": mode.name, "motors": list(mode.motors), "drives": driven, "lacks": lacks})
@@ -210,23 +219,26 @@ class Seeing:
         return self._paths[name, mode]
 
     def _reached(self, path: Path, mode: str) -> list[list[float]]:
-        assembly = self._model.mechanism.assembly(self._model.study.assembly)
+        mechanism = with_any_masses(self._model.mechanism)
+        assembly = mechanism.assembly(self._model.study.assembly)
         orientation = self._model.study.orientation or 0.0
         with suppress(ParaflexError):
             times = np.linspace(0.0, path.duration, _PLACES)
-            motion = follow_path(self._model.mechanism, path, times, assembly=assembly, orientation=orientation)
+            motion = follow_path(mechanism, path, times, assembly=assembly, orientation=orientation)
             return _places(path, times, np.where(self._near(motion, mode), _NEAR, _WELL))
-        closure = PathClosure(self._model.mechanism.rigid(), orientation, path.duration)
+        closure = PathClosure(mechanism.rigid(), orientation, path.duration)
         times = np.linspace(0.0, path.duration, _SEARCHED)
         found = closure.reach.tracked(times, closure.target(path, times)[:, 0], closure.assembled(assembly))
         return _places(path, times, [_NOT if one.part else _WELL for one in found])
 
     def _near(self, motion: RigidMotion, mode: str) -> Mask:
         """Return where the motors of a mode are near a singular position along a motion (k,)."""
-        chosen = next((one for one in self._model.mechanism.modes if one.name == mode), None)
-        if chosen is None or self.massless:
+        effort, effector = required_effort(motion), self._mechanism.end_effector
+        if not self._motors(mode) or effector is None:
             return np.zeros(motion.t.size, dtype=bool)
-        return actuation_condition(required_effort(motion), chosen) > 1.0 / NEAR
+        sizes = [motion.system.size if one == "angle" else 1.0 for one in effector.coordinates]
+        scaled = replace(effort, matrix=effort.matrix / np.reshape(sizes, (-1, 1)))
+        return actuation_condition(scaled, ActuationMode(mode, self._motors(mode))) > 1.0 / NEAR
 
 
 def _places(path: Path, times: Array, reach: ArrayLike) -> list[list[float]]:

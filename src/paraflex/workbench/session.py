@@ -17,7 +17,7 @@ from .bending import drag_force, linear
 from .document import EMPTY, Document
 from .items import fields, outline
 from .leaving import figures, film, link, report, text_of_link
-from .messages import Message, described, field, finite, numbers, one_of
+from .messages import Message, described, field, finite, keys, numbers, one_of
 from .picture import looks
 from .programs import program
 from .runs import Runner
@@ -29,7 +29,7 @@ _WITHOUT_PLACES = ("set", "unset", "rename", "delete", "pose")
 SLOW = ("leave",)
 
 
-class Session:
+class EditSession:
     """State behind all pages that show one document.
 
     Parameters
@@ -41,8 +41,8 @@ class Session:
     """
 
     def __init__(self, document: Document, send: Callable[[Message], None]) -> None:
-        self.document = document
-        self.bench = Bench(document)
+        self.document: Document = document
+        self.bench: Bench = Bench(document)
         self._send, self._lock = send, threading.RLock()
         self._made: list[Path] = []
         self._folder: tempfile.TemporaryDirectory[str] | None = None
@@ -123,7 +123,7 @@ class Session:
         return {"goes": what_goes(self.document.text, field(message, "names", list))}
 
     def _do_fields(self, message: Message) -> Message:
-        return fields(self.document.text, field(message, "place", list))
+        return fields(self.document.text, keys(message, "place"))
 
     def _do_undo(self, _: Message) -> Message:
         self.document.undo()
@@ -197,12 +197,12 @@ class Session:
         return {}
 
     def _do_force(self, message: Message) -> Message:
-        return drag_force(
-            self.bench.known_model, self.bench.mover.q, field(message, "ref", str), numbers(message, "force", 2)
-        )
+        ref, force = field(message, "ref", str), numbers(message, "force", 2) if message.get("force") else []
+        model, q = self.bench.known_model, self.bench.mover.q
+        return drag_force(model, q, ref, force, buckling=message.get("buckling") is not False)
 
     def _do_linear(self, _: Message) -> Message:
-        return linear(self.bench.known_model, self.bench.mode)
+        return linear(self.bench.known_model, self.bench.mover.q, self.bench.mode)
 
     # What a person takes away.
 

@@ -51,7 +51,7 @@ def turning(model: Model, *, assembly: str | None = None, **wishes: Any) -> dict
     Raises
     ------
     InputError
-        As `paraflex kinematics` does: no joint drives the mechanism, it has no motion, the loops do not close.
+        Errors of `paraflex kinematics`: no joint drives the mechanism, it has no motion, the loops do not close.
     """
     motion, problem = _computed(model, assembly or model.study.assembly, wishes)
     data = motion_dataset(motion)

@@ -42,6 +42,7 @@ export class Dragging {
     const under = this.sheet.hit(...px, event.pointerType === "touch" ? 22 : undefined);
     held.under = under;
     if (!under) { held.box = null; return; }
+    held.selected = this.bench.selected.find(({ kind }) => kind === "joint");
     if (!this.bench.isSelected(under.kind, under.name) && !event.shiftKey) this.bench.select(under);
     const ref = under.kind === "body" ? null : this.sheet.places.refsAt(under.at).find((one) => !one.startsWith("ground."));
     const at = under.kind === "body" ? this.sheet.metres(...px) : under.at;
@@ -96,8 +97,14 @@ export class Dragging {
     if (held.sent) { this.end(held); return; }
     if (held.box) { this.selectBox(held.from, held.box, event.shiftKey); return; }
     if (!held.under) { if (!event.shiftKey) this.bench.select(null); } else if (event.shiftKey) this.bench.select(held.under, true);
-    else this.bench.select(held.under);
+    else this.bench.select(this.next(held));
     if (held.under) this.bench.fieldsWanted();
+  }
+
+  // What a click selects: of several joints in one place the next one.
+  next({ under, selected }) {
+    const there = under.kind === "joint" ? this.sheet.places.jointsAt(under.at) : [], at = selected ? there.indexOf(selected.name) : -1;
+    return at < 0 ? under : { ...under, name: there[(at + 1) % there.length] };
   }
 
   selectBox([ax, ay], [bx, by], more) {

@@ -16,6 +16,7 @@ export class Drawing {
     else if (dragged && !this.begun.length && ["link", "beam", "path", "spring", "damper", "revolute", "weld", "gear", "plate"].includes(name)) {
       this.clicked(held.start, event, true);
       this.clicked(end, event, true);
+      if (name === "path") this.finish();
     } else this.clicked(end, event);
   }
 
@@ -118,6 +119,8 @@ export class Drawing {
   joinPoints(place, type) {
     if (!place.ref) { this.missed("a point of a link or of the ground"); return; }
     const refs = this.places.refsAt(place.at), bodies = new Set(refs.map((one) => one.split(".")[0]));
+    const [joint] = this.places.jointsAt(place.at);
+    if (!this.begun.length && joint && this.places.jointsAt(place.at).length >= bodies.size - 1) { this.convert(joint, type); return; }
     if (!this.begun.length && bodies.size > 1 && this.places.jointsAt(place.at).length < bodies.size - 1) {
       this.bench.act({ kind: "add-joint", type, a: refs[0], b: refs.at(-1) });
       return;
@@ -128,7 +131,18 @@ export class Drawing {
     this.bench.act({ kind: "add-joint", type, a, b });
   }
 
+  // A joint between the same points of another type.
+  async convert(joint, type) {
+    const { fields } = await this.bench.link.ask("fields", { place: ["joint", joint] });
+    const [a, b] = fields.map(({ text }) => text).filter((text) => /^[^.\s]+\.[^.\s]+$/.test(text) && isNaN(text));
+    if (await this.bench.act({ kind: "delete", names: [`joint.${joint}`] })) this.bench.act({ kind: "add-joint", type, a, b, name: joint });
+  }
+
+  // A block on a rail; on a point that lies on another link a slot along that link.
   addSlider(place, direction) {
+    const here = this.places.refsAt(place.at), below = place.ref && !direction && this.sheet.hitBody(...place.px, here.map((one) => one.split(".")[0]));
+    const guide = below && this.sheet.shown.points.find(([one, x, y]) => one.startsWith(`${below.name}.`) && Math.hypot(x - place.at[0], y - place.at[1]) > 1e-9);
+    if (guide) { this.bench.act({ kind: "add-joint", type: "slot", a: guide[0], b: place.ref }); return; }
     const ref = this.places.refsAt(place.at).find((one) => !one.startsWith("ground.")) ?? place.ref;
     this.bench.act({ kind: "add-slider", at: ref ?? place.at, direction });
   }

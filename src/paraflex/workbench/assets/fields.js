@@ -25,16 +25,20 @@ export class Fields {
     return [this.bench.placeOf(chosen), ...own.filter(([kind]) => kind !== "body" && kind !== "joint")];
   }
 
-  async refresh() {
-    if (this.asking) { this.again = true; return; }
-    this.asking = true;
+  refresh() {
+    this.again = true;
+    this.asking ??= this.ask();
+    return this.asking;
+  }
+
+  async ask() {
     do {
       this.again = false;
       const places = this.places();
       const found = await Promise.all(places.map((place) => this.bench.link.ask("fields", { place }).catch((error) => ({ fields: [], error }))));
       if (!this.again) this.show(places, found);
     } while (this.again);
-    this.asking = false;
+    this.asking = null;
   }
 
   // Rows stay while their fields do, so that nobody loses the place where they type.
@@ -46,6 +50,7 @@ export class Fields {
     }
     this.keys = keys;
     this.rows = [];
+    this.offer = null;
     const parts = places.map((place, k) => this.section(place, found[k], k));
     this.panel.replaceChildren(...this.head(), ...parts);
   }
@@ -84,10 +89,11 @@ export class Fields {
     this.name?.select();
   }
 
-  // Puts the cursor into the field of a place once it is shown.
-  focus(place) {
-    const found = () => this.rows?.find(({ field }) => String(field.place) === String(place));
-    setTimeout(() => found()?.input.focus(), 150);
+  // Puts the cursor into the field of a place, which may be one that is not in the file yet.
+  async focus(place) {
+    await this.refresh();
+    const found = this.rows?.find(({ field }) => String(field.place) === String(place));
+    if (found) found.input.focus(); else this.offer?.(place.at(-1));
   }
 
   section(place, { fields, addable: more, error }, number) {
@@ -111,13 +117,15 @@ export class Fields {
   adder(place, more) {
     const made = element("select", { class: "more", "aria-label": "Add a field" }, element("option", { value: "" }, "Add a field …"));
     for (const { label, help, unit } of more) made.append(element("option", { value: label, title: help ?? "" }, unit ? `${label} [${unit}]` : label));
-    made.addEventListener("change", () => {
-      const chosen = more.find(({ label }) => label === made.value);
-      made.value = "";
+    const offer = (wanted) => {
+      const chosen = more.find(({ label }) => label === wanted);
+      if (!chosen) return;
       const row = new Row(this.bench, { place: chosen.place ?? [...place, chosen.label], label: chosen.label, text: "", unit: chosen.unit, help: chosen.help, choices: chosen.choices, optional: true });
       made.before(row.box);
       row.input.focus();
-    });
+    };
+    made.addEventListener("change", () => { offer(made.value); made.value = ""; });
+    this.offer ??= offer;
     return made;
   }
 

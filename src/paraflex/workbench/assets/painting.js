@@ -8,6 +8,7 @@ export class Painting {
   }
 
   paint(pen) {
+    if (this.tools.hover && (this.tools.isDrawing || this.tools.held?.far)) this.paintPlace(pen, this.tools.hover.at);
     pen.lineWidth = 1.6;
     pen.strokeStyle = pen.fillStyle = this.sheet.colour("accent");
     const { held, hover } = this.tools;
@@ -15,6 +16,12 @@ export class Painting {
     if (this.tools.tool.name === "shape") this.paintShape(pen);
     else if (this.tools.isDrawing || this.tools.picking) this.paintDrawing(pen);
     else if (this.tools.under && !held && hover) this.paintUnder(pen);
+  }
+
+  // Coordinates of the place to which a click snaps.
+  paintPlace(pen, at) {
+    pen.font = "12px system-ui, sans-serif"; pen.textBaseline = "alphabetic"; pen.fillStyle = this.sheet.colour("soft");
+    pen.fillText(at.map((one, k) => `${"xy"[k]} ${quantity(one, "m", 4) || "0"}`).join("   "), 160, this.sheet.height - 14);
   }
 
   paintBox(pen, [ax, ay], [bx, by]) {

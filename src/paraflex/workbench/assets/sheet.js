@@ -4,6 +4,7 @@ import { Places } from "./places.js";
 
 // The sheet: a canvas with the mechanism in metres, moved and scaled by the person, and layers that others paint over it.
 const LEAST = 1e-5, MOST = 1e4; // width of the view [m]
+const ACTING = ["load", "spring", "sensor"]; // looks of symbols that have names
 const NEAR = 11; // distance at which something is hit [px]
 
 export class Sheet {
@@ -170,10 +171,11 @@ export class Sheet {
 
   paintMarks(marks, looks) {
     const { pen } = this;
-    for (const [, look, , points] of marks) {
+    for (const [, look, name, points] of marks) {
+      const chosen = name && ACTING.includes(look) && this.bench.selected.some((one) => one.name === name && one.kind.includes(look));
       const [fill, stroke, width, dashed] = looks[look] ?? ["", "sensor", 1.4, false];
       pen.setLineDash(dashed ? [6, 4] : []);
-      pen.lineWidth = 1.3 * width; pen.strokeStyle = this.colour(stroke);
+      pen.lineWidth = 1.3 * width; pen.strokeStyle = this.colour(chosen ? "accent" : stroke);
       if (points.length > 1) this.trace(points);
       else { pen.beginPath(); pen.arc(...this.px(...points[0]), 4, 0, 2 * Math.PI); }
       if (fill) { pen.fillStyle = this.colour(fill); pen.fill(); }
@@ -232,7 +234,7 @@ export class Sheet {
       const place = this.px(x, y), where = `${Math.round(place[0])} ${Math.round(place[1])}`;
       if (!atJoint.has(where)) { add(ref.split(".").pop(), `point ${ref}`, place, this.colour("soft"), clear.get(where)); taken.push(place); }
     }
-    for (const [, look, name, points] of shown.marks) if (name && ["load", "spring", "sensor"].includes(look) && !written.has(name)) { written.add(name); add(name, `${look} ${name}`, this.px(...points[0]), this.colour(look === "load" ? "trail" : "soft")); }
+    for (const [, look, name, points] of shown.marks) if (name && ACTING.includes(look) && !written.has(name)) { written.add(name); add(name, `${look} ${name}`, this.px(...points[0]), this.colour(look === "load" ? "trail" : "soft")); }
     shown.bodies.forEach(([name, points], k) => {
       const pixels = points.filter(Boolean).map((point) => this.px(...point)), middle = pixels[Math.floor((pixels.length - 1) / 2)], next = pixels[Math.ceil((pixels.length - 1) / 2)];
       taken.push(...alongLine(pixels));
@@ -265,12 +267,26 @@ export class Sheet {
     };
     for (const [name, , x, y] of shown.joints) offer("joint", name, x, y);
     for (const [ref, x, y] of shown.points) offer("point", ref, x, y);
-    return best ?? this.hitBody(px, py);
+    return best ?? this.hitBody(px, py) ?? this.hitMark(px, py);
   }
 
-  hitBody(px, py) {
+  // A spring, a load or a sensor, which have no place of their own.
+  hitMark(px, py) {
+    const found = this.shown.marks.find(([, look, name, points]) => name && ACTING.includes(look) && this.near(px, py, points, 7));
+    const thing = found && (this.bench.state.outline ?? []).find(({ kind, name }) => name === found[2] && kind.includes(found[1]));
+    return thing ? { kind: thing.kind, name: thing.name, at: this.metres(px, py) } : null;
+  }
+
+  near(px, py, points, least) {
+    const pixels = points.filter(Boolean).map((point) => this.px(...point));
+    return pixels.some((end, k) => toSegment([px, py], pixels[Math.max(k - 1, 0)], end)[1] < least);
+  }
+
+  // The link below a place, other than some.
+  hitBody(px, py, others = []) {
     let best = null, least = 8;
     for (const [name, points, plate] of this.shown.bodies) {
+      if (others.includes(name)) continue;
       const pixels = points.filter(Boolean).map((point) => this.px(...point));
       for (let k = 1; k < pixels.length; k++) {
         const [foot, far] = toSegment([px, py], pixels[k - 1], pixels[k]);

@@ -260,7 +260,7 @@ class Workbench {
     const found = await this.request("goes", { names });
     if (!found) return;
     const go = () => this.act({ kind: "delete", names });
-    const more = found.goes.map((one) => one.name ?? one).filter((one) => !names.includes(one)).map((one) => one.replace(/\./, " "));
+    const more = [...new Set(found.goes.filter(({ name }) => !names.includes(name)).map(({ kind, name, place }) => (place.length > 2 && kind !== "body" ? `an entry of ${kind}` : name.replace(".", " "))))];
     if (!more.length) go();
     else this.ask(`deletes ${listed(more)} as well`, go, "Delete");
   }
