@@ -209,3 +209,38 @@ def test_what_is_taken_away(at_work):
         person.page.get_by_role("menuitem", name="Report").click()
     report.value.wait_for_url("**/report.html")
     assert "five-bar" in report.value.title()
+
+
+def test_a_pull_deflects_as_the_compliance_has_it(at_work):
+    person = at_work("five_bar")
+    person.page.get_by_role("button", name="Pull").click()
+    person.page.get_by_label("Force of a pull").select_option(label="100 mN")
+    x, y = person.pixels(*person.point("distal1.C"))
+    person.page.mouse.move(x, y)
+    person.page.mouse.down()
+    person.page.mouse.move(x + 80, y - 60, steps=4)
+    person.page.mouse.up()
+    person.until("!!workbench.pull.found && !workbench.pull.newest.flight")
+    force, found = person.page.evaluate("[workbench.pull.force, workbench.pull.found]")
+    assert force == pytest.approx([0.08, 0.06], abs=2e-3)
+    large, small = person.state["seen"]["compliance"]["sizes"]
+    angle = person.state["seen"]["compliance"]["angle"]
+    along, across = np.array([np.cos(angle), np.sin(angle)]), np.array([-np.sin(angle), np.cos(angle)])
+    expected = large * (along @ force) * along + small * (across @ force) * across
+    assert found["deflection"] == pytest.approx(expected, rel=5e-3, abs=1e-3 * np.linalg.norm(expected))
+    expect(person.page.locator(".pulling")).to_contain_text("stiffness along the force")
+    # Links are drawn bent, magnified by a round number.
+    factor = person.page.evaluate("workbench.pull.shown")
+    tip = person.page.evaluate("workbench.sheet.picture.points.find(([ref]) => ref === 'distal1.C')")
+    assert np.array(tip[1:]) - person.point("distal1.C") == pytest.approx(factor * expected, rel=1e-2, abs=1e-5)
+    person.page.keyboard.press("Escape")
+    assert person.page.evaluate("workbench.sheet.picture") is None
+
+
+def test_linear_models_show_poles_and_responses(at_work):
+    person = at_work("raparm_i")
+    person.page.get_by_role("button", name="Linear").click()
+    dialog = person.page.get_by_role("dialog", name="Linear model")
+    expect(dialog.locator("canvas[role=img]")).to_have_count(3)
+    held = ", ".join(f"{one:.3g}" for one in person.state["seen"]["held"][:1])
+    expect(dialog).to_contain_text(f"motors held: {held}")

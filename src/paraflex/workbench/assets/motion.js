@@ -367,7 +367,7 @@ export class Motion {
     const found = await this.ask("linear");
     if (!found?.poles) return;
     const { charts, table } = linearCharts(this.bench, found), holder = element("div", { class: "plots" }, ...charts.map((chart) => chart.figure), tableOf(table));
-    this.bench.dialog(`Linear model about this pose${found.mode ? `, mode ${modeText(found.mode)}` : ""}`, holder).classList.add("wide");
+    this.bench.dialog(`Linear model about this pose${this.bench.state.mode ? `, mode ${modeText(this.bench.state.mode)}` : ""}`, holder).classList.add("wide");
   }
 
   // A request whose reply is shown here and not in the message line, but for its refusal.
