@@ -238,7 +238,7 @@ def test_a_pull_deflects_as_the_compliance_has_it(at_work):
 
 
 def test_linear_models_show_poles_and_responses(at_work):
-    person = at_work("raparm_i")
+    person = at_work("five_bar")
     person.page.get_by_role("button", name="Linear").click()
     dialog = person.page.get_by_role("dialog", name="Linear model")
     expect(dialog.locator("canvas[role=img]")).to_have_count(3)
