@@ -1,4 +1,4 @@
-import { Chart, modeText, shortNumber } from "./curves.js";
+import { Chart, modeText, shortNumber, withArrows } from "./curves.js";
 import { button, element, quantity } from "./elements.js";
 import { Pulling, linearCharts } from "./pulling.js";
 import { Recording } from "./recordings.js";
@@ -43,7 +43,7 @@ export class Motion {
     this.turner = button("↻ Turn the crank", "Turn the crank: a full turn with positions, velocities, accelerations and coupler curves", () => this.turn());
     this.runner = button("▶ Run", "Compute the flexible motion in all modes of the study", () => this.run(true), { class: "main" });
     this.bar = element("div", { class: "progress", role: "progressbar", "aria-label": "Progress of the run", hidden: true }, element("i", {}));
-    this.chips = element("div", { class: "chips", role: "radiogroup", "aria-label": "Motion that is shown" });
+    this.chips = withArrows(element("div", { class: "chips", role: "radiogroup", "aria-label": "Motion that is shown" }));
     this.results = element("p", { class: "results" });
     const actions = element("div", { class: "actions" }, this.turner, button("Assemblies", "All ways in which the links can be joined at this place", () => this.showAssemblies()),
       button("Linear", "Poles and frequency responses about this pose", () => this.showLinear()), new Pulling(this.bench).opener, this.runner,
@@ -67,7 +67,7 @@ export class Motion {
   }
 
   makeDrawer() {
-    this.tabs = element("div", { class: "drawer-tabs", role: "tablist", "aria-label": "Charts" });
+    this.tabs = withArrows(element("div", { class: "drawer-tabs", role: "tablist", "aria-label": "Charts" }));
     this.overs = element("select", { "aria-label": "Abscissa of the charts", onchange: () => { this.over = Number(this.overs.value); for (const chart of this.charts) chart.paint(); } });
     this.hasOver = element("label", { class: "over" }, "over", this.overs);
     this.plots = element("div", { class: "plots" });
