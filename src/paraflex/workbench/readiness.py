@@ -1,4 +1,4 @@
-"""One sentence on what stands in the way of a run, and where to mend it."""
+"""One sentence on what stands in the way of a run, and where to correct it."""
 
 from typing import Any
 
