@@ -10,13 +10,15 @@ from playwright.sync_api import expect
 
 import paraflex as pf
 import test_workbench_browser as browsing
+from paraflex.figures.kinematics import kinematics_of
 from paraflex.files import library_text
+from paraflex.results.following import headline
 from paraflex.workbench.computing import computed, model_of
 from test_workbench_browser import Person
 
 at_work = browsing.at_work
 # A four-bar without masses, whose coupler point draws a curve that crosses itself once.
-CROSSING = """
+CROSSING = """name = "crossing"
 [ground]
 O = [0.0, 0.0]
 Q = [2.0, 0.0]
@@ -73,7 +75,9 @@ def painted(person: Person, place: tuple[float, float], colour: str) -> bool:
         """([x, y, colour]) => {
             const { sheet } = workbench, ratio = devicePixelRatio, [px, py] = sheet.px(x, y);
             sheet.paint();
-            const { data } = sheet.pen.getImageData(Math.round(ratio * px) - 2, Math.round(ratio * py) - 2, 5, 5);
+            const copy = new OffscreenCanvas(5, 5).getContext("2d", { willReadFrequently: true });
+            copy.drawImage(sheet.canvas, 2 - Math.round(ratio * px), 2 - Math.round(ratio * py));
+            const { data } = copy.getImageData(0, 0, 5, 5);
             const own = parseInt(sheet.colour(colour).slice(1), 16), parts = [own >> 16, (own >> 8) & 255, own & 255];
             const pixels = Array.from({ length: data.length / 4 }, (_, k) => data.slice(4 * k, 4 * k + 3));
             return pixels.some((pixel) => parts.every((one, j) => Math.abs(one - pixel[j]) < 12));
@@ -136,7 +140,7 @@ def test_a_turn_shows_the_coupler_curve_with_its_values(at_work, tmp_path):
     effector = person.page.evaluate("workbench.sheet.picture.points[0]")
     assert effector[1:] == pytest.approx(curve[k], abs=1e-3)
     person.page.get_by_role("tab", name="Features").click()
-    least = min(one.smallest.value for one in motion.features.transmission_angles)
+    least = min(one["smallest"]["value"] for one in kinematics_of(data)["transmission_angles"])
     expect(person.page.locator(".tiles")).to_contain_text(f"{least:.3g}")
     expect(person.page.locator(".drawer")).to_contain_text("crunode")
 
@@ -146,7 +150,7 @@ def test_a_run_is_played_with_its_numbers(at_work):
     run(person)
     found = computed(model_of(library_text("five_bar"))).begun().result.data
     (shown,) = person.page.evaluate("workbench.motion.recording.numbers")
-    assert shown["error_max"] == pytest.approx(float(found["tracking_max"].values.ravel()[0]), rel=1e-6)
+    assert shown["error_rms"] == pytest.approx(float(headline(found)[0].values.ravel()[0]), rel=1e-6)
     assert shown["stress_max"] == pytest.approx(float(np.nanmax(found["stress_max"].values)), rel=1e-6)
     stress = re.search(r"largest stress ([\d.]+) MPa", person.page.locator(".results").inner_text())
     assert stress
@@ -205,3 +209,38 @@ def test_what_is_taken_away(at_work):
         person.page.get_by_role("menuitem", name="Report").click()
     report.value.wait_for_url("**/report.html")
     assert "five-bar" in report.value.title()
+
+
+def test_a_pull_deflects_as_the_compliance_has_it(at_work):
+    person = at_work("five_bar")
+    person.page.get_by_role("button", name="Pull").click()
+    person.page.get_by_label("Force of a pull").select_option(label="100 mN")
+    x, y = person.pixels(*person.point("distal1.C"))
+    person.page.mouse.move(x, y)
+    person.page.mouse.down()
+    person.page.mouse.move(x + 80, y - 60, steps=4)
+    person.page.mouse.up()
+    person.until("!!workbench.pull.found && !workbench.pull.newest.flight")
+    force, found = person.page.evaluate("[workbench.pull.force, workbench.pull.found]")
+    assert force == pytest.approx([0.08, 0.06], abs=2e-3)
+    large, small = person.state["seen"]["compliance"]["sizes"]
+    angle = person.state["seen"]["compliance"]["angle"]
+    along, across = np.array([np.cos(angle), np.sin(angle)]), np.array([-np.sin(angle), np.cos(angle)])
+    expected = large * (along @ force) * along + small * (across @ force) * across
+    assert found["deflection"] == pytest.approx(expected, rel=5e-3, abs=1e-3 * np.linalg.norm(expected))
+    expect(person.page.locator(".pulling")).to_contain_text("stiffness along the force")
+    # Links are drawn bent, magnified by a round number.
+    factor = person.page.evaluate("workbench.pull.shown")
+    tip = person.page.evaluate("workbench.sheet.picture.points.find(([ref]) => ref === 'distal1.C')")
+    assert np.array(tip[1:]) - person.point("distal1.C") == pytest.approx(factor * expected, rel=1e-2, abs=1e-5)
+    person.page.keyboard.press("Escape")
+    assert person.page.evaluate("workbench.sheet.picture") is None
+
+
+def test_linear_models_show_poles_and_responses(at_work):
+    person = at_work("five_bar")
+    person.page.get_by_role("button", name="Linear").click()
+    dialog = person.page.get_by_role("dialog", name="Linear model")
+    expect(dialog.locator("canvas[role=img]")).to_have_count(3)
+    held = ", ".join(f"{one:.3g}" for one in person.state["seen"]["held"][:1])
+    expect(dialog).to_contain_text(f"motors held: {held}")

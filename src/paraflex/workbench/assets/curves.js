@@ -26,6 +26,18 @@ export function shortNumber(value, digits = 4) {
 // Name of a mode with a true minus.
 export function modeText(name) { return /^[+-]+$/.test(name) ? name.replaceAll("-", "−") : name; }
 
+// Arrows go through the buttons of a group and press them, as through radio buttons.
+export function withArrows(group) {
+  group.addEventListener("keydown", (event) => {
+    const by = { ArrowLeft: -1, ArrowUp: -1, ArrowRight: 1, ArrowDown: 1 }[event.key], count = group.children.length, k = [...group.children].indexOf(event.target);
+    if (!by || k < 0) return;
+    event.preventDefault();
+    group.children[(k + by + count) % count].click();
+    group.children[(k + by + count) % count]?.focus();
+  });
+  return group;
+}
+
 // Round numbers within a range, about as many as asked for.
 export function roundTicks(low, high, count) {
   const rough = (high - low) / Math.max(count, 1), power = 10 ** Math.floor(Math.log10(rough));

@@ -1,4 +1,4 @@
-import { Chart, modeText, shortNumber } from "./curves.js";
+import { Chart, modeText, shortNumber, withArrows } from "./curves.js";
 import { button, element, quantity } from "./elements.js";
 import { Pulling, linearCharts } from "./pulling.js";
 import { Recording } from "./recordings.js";
@@ -43,7 +43,7 @@ export class Motion {
     this.turner = button("↻ Turn the crank", "Turn the crank: a full turn with positions, velocities, accelerations and coupler curves", () => this.turn());
     this.runner = button("▶ Run", "Compute the flexible motion in all modes of the study", () => this.run(true), { class: "main" });
     this.bar = element("div", { class: "progress", role: "progressbar", "aria-label": "Progress of the run", hidden: true }, element("i", {}));
-    this.chips = element("div", { class: "chips", role: "radiogroup", "aria-label": "Motion that is shown" });
+    this.chips = withArrows(element("div", { class: "chips", role: "radiogroup", "aria-label": "Motion that is shown" }));
     this.results = element("p", { class: "results" });
     const actions = element("div", { class: "actions" }, this.turner, button("Assemblies", "All ways in which the links can be joined at this place", () => this.showAssemblies()),
       button("Linear", "Poles and frequency responses about this pose", () => this.showLinear()), new Pulling(this.bench).opener, this.runner,
@@ -67,7 +67,7 @@ export class Motion {
   }
 
   makeDrawer() {
-    this.tabs = element("div", { class: "drawer-tabs", role: "tablist", "aria-label": "Charts" });
+    this.tabs = withArrows(element("div", { class: "drawer-tabs", role: "tablist", "aria-label": "Charts" }));
     this.overs = element("select", { "aria-label": "Abscissa of the charts", onchange: () => { this.over = Number(this.overs.value); for (const chart of this.charts) chart.paint(); } });
     this.hasOver = element("label", { class: "over" }, "over", this.overs);
     this.plots = element("div", { class: "plots" });
@@ -166,6 +166,8 @@ export class Motion {
   take(recording, { play = true } = {}) {
     this.recordings[recording.kind] = recording;
     this.choose(recording.kind, this.kind === recording.kind ? this.index : -1, play);
+    // The space bar then pauses, and does not press the same button again.
+    if ([this.runner, this.turner, document.body].includes(document.activeElement)) this.go.focus({ preventScroll: true });
   }
 
   // Show a motion: the turn, or a run by its number (-1 for that of the chosen mode).
@@ -365,7 +367,7 @@ export class Motion {
     const found = await this.ask("linear");
     if (!found?.poles) return;
     const { charts, table } = linearCharts(this.bench, found), holder = element("div", { class: "plots" }, ...charts.map((chart) => chart.figure), tableOf(table));
-    this.bench.dialog(`Linear model about this pose${found.mode ? `, mode ${modeText(found.mode)}` : ""}`, holder).classList.add("wide");
+    this.bench.dialog(`Linear model about this pose${this.bench.state.mode ? `, mode ${modeText(this.bench.state.mode)}` : ""}`, holder).classList.add("wide");
   }
 
   // A request whose reply is shown here and not in the message line, but for its refusal.

@@ -70,13 +70,14 @@ export class Pulling {
     this.force = [0, 0];
   }
 
-  move(force) {
+  // The load at which it buckles takes longest, and is computed when the pull rests.
+  move(force, buckling = false) {
     this.force = force;
-    this.newest.send({ ref: this.ref, force });
+    this.newest.send({ ref: this.ref, force, buckling });
     this.sheet.repaint();
   }
 
-  end() { this.sheet.repaint(); }
+  end() { if (Math.hypot(...this.force)) this.move(this.force, true); }
 
   take(found) {
     if (!this.ref || !found.bodies) return;
@@ -84,17 +85,16 @@ export class Pulling {
     this.pulled = true;
     this.sheet.picture = this.bent(found);
     this.sheet.repaint();
-    const [dx, dy] = found.deflection, [kx, ky] = found.stiffness, size = Math.hypot(...this.force), lines = [
-      `${this.ref}: deflection ${quantity(dx, "m") || "0"}, ${quantity(dy, "m") || "0"}`, `stiffness x ${quantity(kx, "N/m") || "–"}, y ${quantity(ky, "N/m") || "–"}`,
-      found.buckling_factor ? `buckles at ${shortNumber(found.buckling_factor, 3)} times this force, ${quantity(Math.abs(found.buckling_factor) * size, "N")}` : "", found.stable === false ? "unstable" : "", found.message ?? "",
+    const [dx, dy] = found.deflection, size = Math.hypot(...this.force), lines = [
+      `${this.ref} moves by ${quantity(dx, "m") || "0"}, ${quantity(dy, "m") || "0"}`, found.stiffness ? `stiffness along the force ${quantity(found.stiffness, "N/m")}` : "",
+      found.buckling ? `buckles at ${quantity(found.buckling * size, "N")}, ${shortNumber(found.buckling, 3)} times this force` : "", ...found.findings, this.shown > 1 ? `drawn × ${this.shown}` : "",
     ].filter(Boolean);
-    this.text.replaceChildren(...lines.map((line) => element("div", { class: line === found.message ? "wrong" : "" }, line)));
-    if (this.shown > 1) this.text.append(element("div", { class: "soft" }, `drawn × ${this.shown}`));
+    this.text.replaceChildren(...lines.map((line) => element("div", { class: found.findings.includes(line) ? "wrong" : "" }, line)));
   }
 
-  // The picture with links at rest + m (bent - rest); symbols go with the station that is nearest to them.
+  // The picture with links at base + m (bent - base); symbols go with the station that is nearest to them.
   bent(found) {
-    const { picture } = this.bench.state, moves = found.bodies.flatMap(({ bent, rest }) => rest.map((place, k) => [place, [bent[k][0] - place[0], bent[k][1] - place[1]]]));
+    const { picture } = this.bench.state, moves = found.bodies.flatMap(([, bent], body) => found.base[body].map((place, k) => [place, [bent[k][0] - place[0], bent[k][1] - place[1]]]));
     const most = Math.max(...moves.map(([, by]) => Math.hypot(...by))) * this.sheet.scale;
     this.shown = PULL_SHOWN.findLast((one) => one * most <= SEEN_BENDING) ?? 1;
     const by = (x, y) => {
@@ -102,9 +102,8 @@ export class Pulling {
       return [this.shown * dx, this.shown * dy];
     };
     const shifted = (points) => { const known = points.filter(Boolean), [dx, dy] = by(...[0, 1].map((axis) => known.reduce((sum, one) => sum + one[axis], 0) / known.length)); return points.map((one) => one && [one[0] + dx, one[1] + dy]); };
-    const plates = new Map(picture.bodies.map(([name, , plate]) => [name, plate]));
     return {
-      ...picture, bodies: found.bodies.map(({ name, bent, rest }) => [name, rest.map((place, k) => place.map((one, axis) => one + this.shown * (bent[k][axis] - one))), plates.get(name)]),
+      ...picture, bodies: found.bodies.map(([name, bent, plate], body) => [name, found.base[body].map((place, k) => place.map((one, axis) => one + this.shown * (bent[k][axis] - one))), plate]),
       marks: picture.marks.map(([when, look, name, points]) => [when, look, name, when === "still" ? points : shifted(points)]),
       joints: picture.joints.map(([name, kind, x, y, ...rest]) => { const [dx, dy] = by(x, y); return [name, kind, x + dx, y + dy, ...rest]; }),
       points: picture.points.map(([ref, x, y]) => { const [dx, dy] = ref.startsWith("ground.") ? [0, 0] : by(x, y); return [ref, x + dx, y + dy]; }),
@@ -131,15 +130,16 @@ export class Pulling {
 export function linearCharts(bench, found) {
   const rows = [], row = (values) => rows.push(Float64Array.from(values, (value) => value ?? NaN)) - 1, plain = { run: null, shown: null, choice: null, dash: 0 };
   const base = { choices: [], choosing: "", log: false, log_x: false, equal: false, over_time: false, note: "", layout: {} }, charts = [];
-  const texts = found.poles.map(([re, im]) => `${shortNumber(re)} ${im < 0 ? "−" : "+"} ${shortNumber(Math.abs(im))} i`);
-  charts.push({ ...base, identity: "poles", title: "Poles", x: "real part [rad/s]", y: ["imaginary part [rad/s]"], curves: [{ ...plain, name: "poles", mark: "cross", texts, colour: 0, x: row(found.poles.map(([re]) => re)), y: row(found.poles.map(([, im]) => im)) }] });
-  if (found.bode) {
-    const at = row(found.bode.frequency), curves = (key, factor) => found.bode.outputs.map((one, k) => ({ ...plain, name: one.name, colour: k, dash: [0, 1, 3][k % 3], x: at, y: row(one[key].map((value) => factor * value)) })), units = [...new Set(found.bode.outputs.map((one) => one.unit))];
-    charts.push({ ...base, identity: "magnitude", title: `Response to ${found.bode.input}`, x: "frequency [Hz]", y: [`magnitude [${units.join(", ")}]`], log: true, log_x: true, curves: curves("magnitude", 1) });
-    charts.push({ ...base, identity: "phase", title: "Phase", x: "frequency [Hz]", y: ["phase [°]"], log_x: true, curves: curves("phase", 1) });
+  const texts = found.poles.map(([re, im]) => `${shortNumber(re)} ± ${shortNumber(im)} i`), both = (part) => row([...found.poles.map(part), ...found.poles.map(part)]);
+  const whole = found.poles.map(([, im]) => im);
+  charts.push({ ...base, identity: "poles", title: "Poles", x: "real part [1/s]", y: ["imaginary part [rad/s]"], curves: [{ ...plain, name: "poles", mark: "cross", texts: [...texts, ...texts], colour: 0, x: both(([re]) => re), y: row([...whole, ...whole.map((im) => -im)]) }] });
+  if (found.responses.length) {
+    const at = row(found.frequency), curves = (key) => found.responses.map((one, k) => ({ ...plain, name: one.output, colour: k % 8, dash: [0, 1, 3][k % 3], x: at, y: row(one[key]) })), units = [...new Set(found.responses.map((one) => one.unit))];
+    charts.push({ ...base, identity: "magnitude", title: `Response to ${found.input}`, x: "frequency [Hz]", y: [`magnitude [dB of ${units.join(", ")}]`], log_x: true, curves: curves("magnitude") });
+    charts.push({ ...base, identity: "phase", title: "Phase", x: "frequency [Hz]", y: ["phase [°]"], log_x: true, curves: curves("phase") });
   }
   const page = { rows, runs: [""], abscissae: [], time: -1 }, clock = { time: 0, index: 0, over: 0, seek() {} };
-  const ordered = found.poles.map(([re, im], k) => [re, im, found.damping?.[k]]).filter(([, im]) => im >= 0).slice(0, 12);
-  const table = { title: "Poles", heads: [["real part", "rad/s"], ["imaginary part", "rad/s"], ["frequency", "Hz"], ["damping ratio", ""]], rows: ordered.map(([re, im, damping]) => [shortNumber(re), shortNumber(im), shortNumber(Math.hypot(re, im) / (2 * Math.PI)), shortNumber(damping ?? NaN)]), note: "" };
+  const note = [found.held.length ? `Frequencies with these motors held: ${found.held.map((one) => shortNumber(one, 3)).join(", ")} Hz.` : "", found.unbalanced > 1e-6 ? `The mechanism does not rest here: it would start with ${quantity(found.unbalanced, "m/s^2")}.` : ""].filter(Boolean).join(" ");
+  const table = { title: "Poles", heads: [["real part", "1/s"], ["imaginary part", "rad/s"], ["frequency", "Hz"], ["damping ratio", ""]], rows: found.poles.slice(0, 12).map((pole) => pole.map((one) => shortNumber(one ?? NaN))), note };
   return { charts: charts.map((one) => new Chart(bench, clock, one, page)), table };
 }

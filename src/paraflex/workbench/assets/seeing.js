@@ -1,4 +1,4 @@
-import { modeText, shortNumber } from "./curves.js";
+import { modeText, shortNumber, withArrows } from "./curves.js";
 import { element, quantity } from "./elements.js";
 
 // Numbers of the pose at the side, and on the sheet the compliance ellipse, the path by reach, and trails of a drag.
@@ -13,7 +13,7 @@ export class Seeing {
     Object.assign(this, { bench, sheet: bench.sheet, trails: new Map() });
     this.rows = new Map();
     this.list = element("dl", {});
-    this.chips = element("div", { class: "modes", role: "radiogroup", "aria-label": "Mode whose motors hold and drive" });
+    this.chips = withArrows(element("div", { class: "modes", role: "radiogroup", "aria-label": "Mode whose motors hold and drive" }));
     this.panel = element("details", { class: "numbers", open: true }, element("summary", {}, "This pose"), this.list, this.chips);
     bench.parts.side.prepend(this.panel);
     for (const what of ["state", "picture"]) bench.on(what, () => this.show());

@@ -18,7 +18,7 @@ const KEYS = [
   ["Letters", "tools, as beside their names"], ["Escape", "ends what was begun; then the select tool"], ["Enter", "ends a link or path of several points; sets a point at the cursor of the arrows"],
   ["Arrows", "move the selected point by one step of the grid, or the cursor of a drawing tool"], ["Alt", "no snapping to the grid"], ["Shift", "adds to the selection; a link with more points"],
   ["Delete", "deletes the selection"], ["F2", "renames it"], ["Ctrl+D", "copies it"], ["Ctrl+Z, Ctrl+Y", "undo and redo"], ["Ctrl+S", "saves"], ["Space", "plays the motion; held while dragging it moves the sheet"],
-  ["0 or Home", "shows all"], ["Wheel, two fingers", "zoom; the middle button moves the sheet"],
+  ["Arrows on the slider of time", "frame by frame; with Shift ten at a time"], ["0 or Home", "shows all"], ["Wheel, two fingers", "zoom; the middle button moves the sheet"],
 ];
 
 // The page: what all parts share, where they stand, and the keys.
