@@ -65,7 +65,7 @@ export class Tools {
       tools.append(box);
     }
     this.hint = element("span", { class: "hint" });
-    this.ready = button("", "What stands in the way of a run: click to go there", () => this.goReady(), { class: "ready" });
+    this.ready = button("", "What stands in the way of a run: click to go there", () => this.goReady(), { class: "ready", "aria-label": null });
     stage.append(element("div", { class: "status" }, this.hint, this.ready));
   }
 
