@@ -14,6 +14,7 @@ export class Link {
   // The reply to a message; an error of Python has its fields text, field and remedy.
   ask(what, fields = {}) {
     const id = this.next++;
+    if (this.ended) return Promise.reject(Object.assign(new Error(this.ended), { text: this.ended }));
     return new Promise((resolve, reject) => {
       this.waiting.set(id, { resolve, reject });
       this.port.send({ id, do: what, ...fields });
@@ -34,6 +35,7 @@ export class Link {
 
   // Nothing will be answered any more.
   end(text) {
+    this.ended = text;
     for (const { reject } of this.waiting.values()) reject(Object.assign(new Error(text), { text }));
     this.waiting.clear();
     for (const listener of this.listeners.get("end") ?? []) listener({ text });

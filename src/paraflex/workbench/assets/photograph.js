@@ -43,7 +43,7 @@ export class Photograph {
     if (image) {
       this.size = 0.8 * Math.min(sheet.width / image.width, sheet.height / image.height) / sheet.scale;
       this.place = [...sheet.centre];
-      this.bench.say("The photograph lies under the grid. Scale it: click two points whose distance you know.");
+      this.bench.say("");
       this.scale();
     }
     sheet.repaint();

@@ -65,7 +65,7 @@ export class Tools {
       tools.append(box);
     }
     this.hint = element("span", { class: "hint" });
-    this.ready = button("", "What stands in the way of a run: click to go there", () => this.goReady(), { class: "ready" });
+    this.ready = button("", "What stands in the way of a run: click to go there", () => this.goReady(), { class: "ready", "aria-label": null });
     stage.append(element("div", { class: "status" }, this.hint, this.ready));
   }
 
@@ -180,7 +180,11 @@ export class Tools {
     this.moved(event);
   }
 
-  snap(px, py, event, near) { return this.sheet.places.snap(px, py, event, this.drawing.begun, near); }
+  // The grid does not attract what is picked on a photograph.
+  snap(px, py, { altKey, pointerType }, near) {
+    const event = { altKey: altKey || !!this.picking, pointerType };
+    return this.sheet.places.snap(px, py, event, this.drawing.begun, near);
+  }
 
   spread() {
     const [[ax, ay], [bx, by]] = [...this.pointers.values()];
