@@ -10,7 +10,9 @@ import pytest
 import paraflex as pf
 from paraflex.errors import AssemblyError, InputError
 from paraflex.figures.kinematics import kinematics_of
+from paraflex.files import load
 from paraflex.results import motion_dataset
+from paraflex.results.posed import posed
 from paraflex.workbench.moving import Mover, assemblies
 from paraflex.workbench.turning import turning
 
@@ -294,3 +296,10 @@ def test_a_turn_without_masses_has_no_torques():
     angles = [math.acos((9.0 + 6.25 - d * d) / 15.0) for d in (2.5, 4.5)]
     least = min(min(angle, np.pi - angle) for angle in angles)
     assert math.isclose(one["smallest"]["value"], least, rel_tol=1e-7)
+
+
+@pytest.mark.parametrize("name", ["four_bar", "slider_crank_flexible", "spin_up", "five_bar"])
+def test_the_pose_is_that_in_which_a_run_begins(name):
+    model = load(name)
+    begun = posed(model.mechanism, model.study.assembly)
+    assert Mover(model.mechanism, model.study.assembly).angles() == pytest.approx(begun.angles, abs=1e-9)

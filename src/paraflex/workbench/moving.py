@@ -11,14 +11,14 @@ from paraflex.arrays import Array
 from paraflex.driven.assemblies import poses_of
 from paraflex.driven.exact import NO_TASKS
 from paraflex.driven.ranges import JointDrive
-from paraflex.dynamics import System, material_angle, reference_pose
+from paraflex.dynamics import System, closure_of, material_angle, reference_pose, standing_system
 from paraflex.dynamics.joint_coordinates import joint_rows, joint_value
 from paraflex.dynamics.points import marker_position
 from paraflex.dynamics.projection import assemble, closed, constraint_change
 from paraflex.dynamics.soundness import mobility
 from paraflex.dynamics.state import State
 from paraflex.errors import InputError, listed
-from paraflex.mechanism import GROUND, ConstantSpeed, Joint, Mechanism, PointRef, RevoluteJoint, WeldJoint
+from paraflex.mechanism import GROUND, Assembly, ConstantSpeed, Joint, Mechanism, PointRef, RevoluteJoint, WeldJoint
 from paraflex.mechanism.masses import with_any_masses
 from paraflex.mechanism.poses import local_points
 from paraflex.mechanism.quantities import known
@@ -130,7 +130,7 @@ class Mover:
         if not self.mechanism.assemblies:
             remedy = "add an [assembly.NAME] table with an approximate angle of each body, in rad"
             raise InputError("no assembly: the poses of the bodies are unknown", field="assembly.NAME", remedy=remedy)
-        return self.at(self.loops.assembled(self.mechanism.assembly(name)))
+        return self.at(_begun(self.mechanism, self.loops, self.mechanism.assembly(name)))
 
     def at(self, q: Array) -> Array:
         """Move to a pose (n,), whose loops are closed, and return it; drags stay in its assembly."""
@@ -164,7 +164,7 @@ class Mover:
         pose, phi = assemble(system, loops.signals, 0.0, guess, change, longest=_LONGEST)
         kept = closed(system, pose, phi)
         if not kept:
-            pose = loops.assembled(mechanism.assembly(None))
+            pose = _begun(mechanism, loops, mechanism.assembly(None))
         self.mechanism, self.loops, self.system = mechanism, loops, system
         self.at(pose)
         return kept
@@ -311,6 +311,15 @@ class Mover:
     def _rank(drag: Dragging, q: Array, free: Array) -> int:
         """Return in how many directions the dragged point can move."""
         return int(np.sum(np.linalg.svd(drag.rows(q) @ free, compute_uv=False) > 10.0 * MARGIN))
+
+
+def _begun(mechanism: Mechanism, loops: LoopClosure, assembly: Assembly) -> Array:
+    """Return the pose in which a run begins: with prescribed motions as they begin, if the loops close with them."""
+    if mechanism.prescribed:
+        found = closure_of(standing_system(with_any_masses(mechanism).rigid(), assembly.name), assembly)
+        if found.state is not None:
+            return found.state.q
+    return loops.assembled(assembly)
 
 
 def assemblies(mover: Mover, starts: int = 200, *, hold: str = "") -> list[Array]:
