@@ -10,10 +10,12 @@ release to the flexible motion in all modes of the study. The table has the goal
 
 from __future__ import annotations
 
+import os
 import re
 import statistics
 import subprocess
 import sys
+import tempfile
 from typing import Any
 
 from common import command_line, conditions, table, write_json
@@ -112,7 +114,12 @@ def main() -> None:
         browser = playwright.chromium.launch(executable_path=asked.browser, args=["--no-sandbox"])
         for model in LENGTHS:
             command = [sys.executable, "-m", "paraflex", "edit", model, "--no-open"]
-            with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
+            with (
+                tempfile.TemporaryDirectory() as drafts,
+                subprocess.Popen(
+                    command, stdout=subprocess.PIPE, text=True, env={**os.environ, "XDG_STATE_HOME": drafts}
+                ) as process,
+            ):
                 assert process.stdout is not None
                 page = browser.new_page(viewport={"width": 1400, "height": 1000})
                 page.goto(re.search(r"http://\S+", process.stdout.readline())[0])  # type: ignore[index]

@@ -9,9 +9,11 @@ from __future__ import annotations
 
 import argparse
 import io
+import os
 import re
 import subprocess
 import sys
+import tempfile
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -29,14 +31,21 @@ FRAMES, EACH = 100, 100
 def shown(browser: Any, model: str, size: dict[str, int], scheme: str = "light") -> Iterator[Any]:
     """A page of `paraflex edit` with a model."""
     command = [sys.executable, "-m", "paraflex", "edit", model, "--no-open"]
-    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as process:
+    with (
+        tempfile.TemporaryDirectory() as drafts,
+        subprocess.Popen(
+            command, stdout=subprocess.PIPE, text=True, env={**os.environ, "XDG_STATE_HOME": drafts}
+        ) as process,
+    ):
         assert process.stdout is not None
         page = browser.new_page(viewport=size, color_scheme=scheme)
         page.goto(re.search(r"http://\S+", process.stdout.readline())[0])  # type: ignore[index]
         page.wait_for_function("() => workbench.state.picture && workbench.sheet.frames > 2")
         page.wait_for_timeout(1200)
-        yield page
-        page.close()
+        try:
+            yield page
+        finally:
+            page.close()
 
 
 def place(page: Any, ref: str) -> tuple[float, float]:
@@ -64,17 +73,17 @@ def film(page: Any) -> list[Image.Image]:
 
     def keep() -> None:
         found = Image.open(io.BytesIO(page.screenshot())).convert("RGB")
-        frames.append(found.convert("P", palette=Image.Palette.ADAPTIVE, colors=64))
+        frames.append(found.convert("P", palette=Image.Palette.ADAPTIVE, colors=96))
 
     page.mouse.move(x, y)
     page.mouse.down()
     for k in range(FRAMES // 2):
         share = k / (FRAMES // 2 - 1)
-        page.mouse.move(x + 60 * share, y + 90 * share)
+        page.mouse.move(x - 70 * share, y - 60 * share)
         keep()
     page.mouse.up()
     page.evaluate("() => workbench.request('back')")
-    page.get_by_role("button", name=re.compile("^Run")).first.click()
+    page.get_by_role("button", name=re.compile("Run")).first.click()
     page.wait_for_timeout(6000)
     for _ in range(FRAMES - len(frames)):
         page.wait_for_timeout(EACH)

@@ -245,7 +245,11 @@ def test_a_leaf_spring_guide_is_drawn_until_its_mass_is_asked_for(at_work):
     expect(mass).to_be_focused()
     mass.fill("200 g")
     person.changes(lambda: mass.press("Enter"))
-    assert tomllib.loads(person.state["text"])["body"]["link3"]["mass"] == "200 g"
+    # Neither mass nor inertia can be given alone: the inertia is that of a rod.
+    link = tomllib.loads(person.state["text"])["body"]["link3"]
+    assert link["mass"] == "200 g"
+    assert link["inertia"] == pytest.approx(0.2 * 0.1**2 / 12, rel=1e-4)
+    assert link["centre_of_mass"] == pytest.approx([0.05, 0.0])
 
 
 def test_an_open_chain_is_ready_to_run(at_work):
@@ -402,6 +406,23 @@ def test_deleting_names_what_goes_as_well(at_work):
     assert ["A1" in data["joint"], "left" in data["motor"]] == [False, False]
     person.undo_all()
     assert person.state["text"] == library_text("five_bar")
+
+
+def test_a_link_is_renamed_and_copied_by_keys(at_work):
+    person = at_work("four_bar")
+    person.click(*middle_of(person, "crank"))
+    person.page.keyboard.press("F2")
+    expect(person.page.get_by_label("Name", exact=True)).to_be_focused()
+    person.page.keyboard.type("handle")
+    person.changes(lambda: person.page.keyboard.press("Enter"))
+    assert tomllib.loads(person.state["text"])["joint"]["O"] == ["ground.O", "handle.O"]
+    expect(person.page.get_by_label("Name", exact=True)).to_have_value("handle")
+    assert person.message == ""
+    person.page.locator("canvas.sheet").focus()
+    person.changes(lambda: person.page.keyboard.press("Control+d"))
+    assert len(tomllib.loads(person.state["text"])["body"]) == 4
+    person.undo_all()
+    assert person.state["text"] == library_text("four_bar")
 
 
 def test_lengths_change_where_a_point_is_dragged(at_work):

@@ -33,37 +33,14 @@ _ROUNDING, _NOTHING = 1e-7, 1e-9
 
 
 def drag_force(model: Model, q: Array, ref: str, force: Sequence[float], *, buckling: bool = True) -> dict[str, Any]:
-    """Return the statics of a force at a point, with motors and prescribed joints held at a rigid pose.
+    """Return the statics of a force along x and y [N] at a point, "body.point", as `paraflex.statics` finds it.
 
-    Weight, loads and springs act in full, as in `paraflex.statics`.
-
-    Parameters
-    ----------
-    model : Model
-        Model with flexible links or springs.
-    q : (n,) array
-        Coordinates of the rigid pose.
-    ref : str
-        Point, "body.point".
-    force : sequence of float
-        Force along x and y [N]; zero, or an empty one, leaves weight and loads alone.
-    buckling : bool
-        Whether a buckling factor is computed, for which limit points beyond the force are searched.
-
-    Returns
-    -------
-    dict
-        `bodies` as in a picture, deflected, and `base`, the lines of the undeformed bodies, point by point; `place` of
-        the deflected point [m], and its `deflection` by the force; `stiffness`, the force over the deflection along it
-        [N/m], None without a force or if nothing yields; `buckling`, the factor of the force at which the mechanism
-        buckles, None if it does not; and `findings`, a line each.
-
-    Raises
-    ------
-    InputError
-        A point is unknown, nothing bends, or the motors do not hold the mechanism.
-    NumericalError
-        No equilibrium is found.
+    Motors and prescribed motions are held at a rigid pose q (n,); an empty force leaves weight, loads and springs. The
+    dict has `bodies` as in a picture, deflected, and `base`, the lines of the undeformed bodies, point by point;
+    `place` of the deflected point [m], and its `deflection` by the force; `stiffness`, the force over the deflection
+    along it [N/m], None without a force or if nothing yields; `buckling`, the factor of the force at which the
+    mechanism buckles, None if it does not or is not asked for, as limit points beyond the force are searched; and
+    `findings`, a line each. InputError: the point is unknown, nothing bends, or the motors do not hold the mechanism.
     """
     names = [f"{ref}.{axis}" for axis in ("x", "y")]
     for name in names:
@@ -123,7 +100,9 @@ def _stiffness(force: Array, deflection: Array) -> float | None:
 
 
 def _factor(found: Statics) -> float | None:
-    factor = float(np.min(found.buckling[0], initial=np.inf))
+    """Return the least buckling factor: a limit point of the branch, else that about the last equilibrium."""
+    factors = found.buckling[0 if np.any(found.limit) else -1]
+    factor = float(np.min(factors, initial=np.inf))
     return factor if np.isfinite(factor) else None
 
 
@@ -137,30 +116,14 @@ def _findings(found: Statics) -> list[str]:
 
 
 def linear(model: Model, q: Array, mode: str) -> dict[str, Any]:
-    """Return the linear model at rest in a rigid pose: poles, and the response of the end-effector.
+    """Return the linear model at rest in a rigid pose q (n,) with the motors of a mode; empty for all motors.
 
-    Parameters
-    ----------
-    model : Model
-        Model with masses.
-    q : (n,) array
-        Coordinates of the rigid pose.
-    mode : str
-        Name of the actuation mode; empty for all motors.
-
-    Returns
-    -------
-    dict
-        `poles`, the slowest as [real part [1/s], imaginary part [rad/s], frequency [Hz], damping ratio], without the
-        lower halves of pairs; `held`, the lowest natural frequencies with these motors held [Hz]; `unbalanced`, the
-        acceleration with which the mechanism would start [m/s^2]; `input`, the name of the first motor or prescribed
-        motion, else of a force at the end-effector; `frequency` [Hz]; and `responses` of the end-effector, else of the
-        motor's joint or the sensors, as far as they respond: `output`, `unit`, `magnitude` [dB] and `phase` [degrees].
-
-    Raises
-    ------
-    InputError
-        The model has no inputs, or no degrees of freedom.
+    The dict has `poles`, the slowest as [real part [1/s], imaginary part [rad/s], frequency [Hz], damping ratio],
+    without the lower halves of pairs; `held`, the lowest natural frequencies with these motors held [Hz]; `unbalanced`,
+    the acceleration with which the mechanism would start [m/s^2]; `input`, the name of the first motor or prescribed
+    motion, else of a force at the end-effector; `frequency` [Hz]; and `responses` of the end-effector, else of the
+    motor's joint or the sensors, as far as they respond: `output`, `unit`, `magnitude` [dB] and `phase` [degrees].
+    InputError: there are no inputs, or no degrees of freedom.
     """
     mechanism = _standing(model.mechanism, q)
     driven, effector = bool(mechanism.motors or mechanism.prescribed), mechanism.end_effector

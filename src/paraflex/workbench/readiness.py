@@ -37,28 +37,28 @@ def readiness(
     if gaps:
         name, gap = next(iter(gaps.items()))
         return _not(f"The loops do not close: joint {name} is open by {gap}", ["joint", name], "shape")
-    if problem is not None and getattr(problem, "field", "") != "body":
-        return _not(str(problem), _parts(str(getattr(problem, "field", ""))))
+    apart = model is not None and not (model.mechanism.joints or model.mechanism.linear_springs)
+    where = _parts(str(getattr(problem, "field", "")))
+    if problem is not None and where != ["body"] and not (apart and where[:1] == ["assembly"]):
+        return _not(str(problem), where)
     if model is None:
         return _not("Draw a link: press where it begins, and again where it ends", [], "link")
-    if not model.mechanism.joints:
+    if apart:
         return _not("Join the links: draw one that begins on another or on the ground", [], "link")
     if seen is None:
         return _not("The mechanism has no pose", ["assembly"])
     return _of_motion(model, int(seen["freedoms"])) or _of_study(model, seen)
 
 
-def checked(model: Model, ready: Message) -> Message:
-    """Return what `readiness` found, corrected by all checks of `paraflex info`, which take longer than an edit may.
+def checked(model: Model) -> Message:
+    """Return whether all checks of `paraflex info` let a model run; they take longer than an edit may.
 
-    A model whose run would be wrong is not ready. `findings` has a line for each finding.
+    The message is that of `readiness`, for a run that would be wrong, with `findings`, a line each.
     """
     verdict = check(model)
-    ready = {**ready, "findings": finding_lines(verdict)}
-    wrong = next((one for one in verdict if one.level is Level.WRONG), None)
-    if wrong is None or not ready["ok"]:
-        return ready
-    return {**ready, **_not(f"{wrong.place}: {wrong.text}; {wrong.remedy}", _parts(wrong.place))}
+    wrong = [_not(f"{one.place}: {one.text}; {one.remedy}", _parts(one.place)) for one in verdict
+             if one.level is Level.WRONG]  # fmt: skip
+    return {"ok": True, **(wrong[0] if wrong else {}), "findings": finding_lines(verdict)}
 
 
 def _of_motion(model: Model, freedoms: int) -> Message | None:
@@ -75,7 +75,7 @@ def _of_motion(model: Model, freedoms: int) -> Message | None:
         return _not(f"Choose what moves it: {drives}", [], "motor" if freedoms > 1 else "drive")
     if massless is not None:
         kind = "can be turned by its crank" if mechanism.prescribed else "can be moved by hand"
-        return _not(f"It {kind}; for a run, give {massless} a mass", ["body", massless, "mass"])
+        return _not(f"It {kind}; for a run, {massless} needs a mass", ["body", massless, "mass"])
     return _pull(model) if pulled else None
 
 

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from paraflex.actuation import actuation_condition, required_effort
+from paraflex.actuation.allocation import motor_rows
 from paraflex.arrays import Array, ArrayLike, Mask
 from paraflex.dynamics import System, acting_loads, build_system, undeformed
 from paraflex.dynamics.joint_coordinates import joint_rows
@@ -18,7 +18,7 @@ from paraflex.dynamics.state import State
 from paraflex.dynamics.stiffness import RestingForces
 from paraflex.errors import InputError, NumericalError, ParaflexError
 from paraflex.files import Model
-from paraflex.mechanism import ActuationMode, Mechanism
+from paraflex.mechanism import Mechanism
 from paraflex.mechanism.masses import check_masses, with_any_masses
 from paraflex.paths import Path
 from paraflex.paths.closure import PathClosure, RigidMotion, follow_path
@@ -28,6 +28,8 @@ _DEPENDENT, _SHOWN = 1e-9, 3
 # Ratio of singular values below which a position counts as near a singular one, and numbers of places of a path
 # that is followed, and of one that leaves the reach.
 NEAR, _PLACES, _SEARCHED = 0.05, 120, 40
+# Largest velocity by unit motions of one body below which all are small, as with all legs stretched.
+_SMALL = 0.5
 _NOT, _NEAR, _WELL = 0, 2, 1
 
 
@@ -103,10 +105,10 @@ class Seeing:
         free = self._free(q)
         by_motors, by_task = self._moved(q, motors, free)
         count = free.shape[1]
-        task = 0 if by_task is None else min(len(by_task), count)
+        task, bodies = 0 if by_task is None else min(len(by_task), count), len(self._rigid.bodies)
         return {
-            "parallel": _ratio(by_motors, count) if len(by_motors) >= count > 0 else None,
-            "serial": None if by_task is None or not task else _ratio(by_task, task),
+            "parallel": float(_ratio(by_motors, count, bodies)) if len(by_motors) >= count > 0 else None,
+            "serial": None if by_task is None or not task else float(_ratio(by_task / self._rigid.size, task, bodies)),
         }
 
     def full(self, q: Array, mode: str) -> dict[str, Any]:
@@ -232,13 +234,17 @@ class Seeing:
         return _places(path, times, [_NOT if one.part else _WELL for one in found])
 
     def _near(self, motion: RigidMotion, mode: str) -> Mask:
-        """Return where the motors of a mode are near a singular position along a motion (k,)."""
-        effort, effector = required_effort(motion), self._mechanism.end_effector
-        if not self._motors(mode) or effector is None:
-            return np.zeros(motion.t.size, dtype=bool)
-        sizes = [motion.system.size if one == "angle" else 1.0 for one in effector.coordinates]
-        scaled = replace(effort, matrix=effort.matrix / np.reshape(sizes, (-1, 1)))
-        return actuation_condition(scaled, ActuationMode(mode, self._motors(mode))) > 1.0 / NEAR
+        """Return where the mechanism is near a singular position along a motion (k,)."""
+        effector, system = self._mechanism.end_effector, motion.system
+        assert effector is not None
+        sizes = [1.0 if one == "angle" else system.size for one in effector.coordinates]
+        free, per_task = np.linalg.qr(motion.basis / system.units[:, None] * sizes)
+        driven = [motor.name in self._motors(mode) for motor in self._mechanism.motors]
+        near = _ratio(np.linalg.inv(per_task), len(sizes), len(system.bodies)) < NEAR
+        if sum(driven) < len(sizes):
+            return near
+        by_motors = np.swapaxes(motor_rows(motion)[:, :, driven] * system.units[:, None], 1, 2) @ free
+        return near | (_ratio(by_motors, len(sizes), len(system.bodies)) < NEAR)
 
 
 def _places(path: Path, times: Array, reach: ArrayLike) -> list[list[float]]:
@@ -250,10 +256,10 @@ def _rank(rows: Array) -> int:
     return int(np.sum(np.linalg.svd(rows, compute_uv=False) > 1e-7)) if rows.size else 0
 
 
-def _ratio(rows: Array, freedoms: int) -> float:
-    """Return the ratio of singular values, the one of number `freedoms` to the largest; zero if there are fewer."""
+def _ratio(rows: Array, count: int, bodies: int) -> Array:
+    """Return the singular value of a number over the largest (...,), of rows (..., k, motions) by unit motions."""
     sizes = np.linalg.svd(rows, compute_uv=False)
-    return float(sizes[freedoms - 1] / sizes[0]) if sizes.size >= freedoms and sizes[0] > 0.0 else 0.0
+    return sizes[..., count - 1] / np.maximum(sizes[..., 0], _SMALL / np.sqrt(bodies))
 
 
 def _condition(by_task: Array | None, by_motors: Array) -> float | None:

@@ -20,6 +20,7 @@ from .leaving import figures, film, link, report, text_of_link
 from .messages import Message, described, field, finite, keys, numbers, one_of
 from .picture import looks
 from .programs import program
+from .readiness import checked
 from .runs import Runner
 from .turning import turning
 
@@ -190,6 +191,9 @@ class EditSession:
         request = {"text": self.document.text, "folder": self.document.folder, "source": self.document.name}
         request |= {name: field(message, name, list) for name in ("modes",) if message.get(name)}
         return {"run": self._runner.start(request, lambda event: self._send({"event": "run", **event}))}
+
+    def _do_check(self, _: Message) -> Message:
+        return checked(self.bench.known_model)
 
     def _do_cancel(self, _: Message) -> Message:
         if self._runner is not None:

@@ -69,22 +69,23 @@ export class Fields {
   // The name of what is selected, edited in place.
   naming(chosen) {
     const short = chosen.kind === "point" ? chosen.name.split(".").pop() : chosen.name;
-    this.name = element("input", { type: "text", class: "name", value: short, "aria-label": "Name", spellcheck: "false", title: "Name (F2)", disabled: !short });
+    const input = this.name = element("input", { type: "text", class: "name", value: short, "aria-label": "Name", spellcheck: "false", title: "Name (F2)", disabled: !short });
     const commit = async () => {
-      const to = this.name.value.trim();
-      if (!to || to === short || this.name.dataset.sent === to) return;
-      this.name.dataset.sent = to;
+      const to = input.value.trim();
+      if (!to || to === short || input.dataset.sent === to) return;
+      input.dataset.sent = to;
       const [kind] = this.bench.placeOf(chosen), of = chosen.kind === "point" ? "point" : kind;
-      if (!await this.bench.act({ kind: "rename", of, name: chosen.name, to })) this.name.dataset.sent = "";
+      if (!await this.bench.act({ kind: "rename", of, name: chosen.name, to })) input.dataset.sent = "";
     };
-    this.name.addEventListener("keydown", ({ key }) => { if (key === "Enter") commit(); if (key === "Escape") { this.name.value = short; this.bench.sheet.canvas.focus(); } });
-    this.name.addEventListener("blur", commit);
+    input.addEventListener("keydown", ({ key }) => { if (key === "Enter") commit(); if (key === "Escape") { input.value = short; this.bench.sheet.canvas.focus(); } });
+    input.addEventListener("blur", commit);
     return element("h2", { class: "naming" }, element("span", {}, kindLabel(chosen.kind)), short ? this.name : "");
   }
 
-  rename() {
+  async rename() {
     if (this.bench.selected.length !== 1) return;
     this.bench.showTab("properties");
+    await this.refresh();
     this.name?.focus();
     this.name?.select();
   }

@@ -215,10 +215,10 @@ export class Sheet {
     const atJoint = new Map(), clear = new Map(); // radius of what is painted around a place [px]
     for (const [, look, , points] of shown.marks) {
       if (look === "ground") taken.push(...alongLine(points.filter(Boolean).map((point) => this.px(...point))));
-      if (look !== "motor") continue;
+      if (!["motor", "block", "weld"].includes(look)) continue;
       const [xs, ys] = [0, 1].map((k) => points.filter(Boolean).map((point) => this.px(...point)[k]));
       const [left, right, top, bottom] = [Math.min(...xs), Math.max(...xs), Math.min(...ys), Math.max(...ys)];
-      clear.set(`${Math.round((left + right) / 2)} ${Math.round((top + bottom) / 2)}`, (right - left) / 2);
+      clear.set(`${Math.round((left + right) / 2)} ${Math.round((top + bottom) / 2)}`, Math.max(right - left, bottom - top) / 2);
     }
     for (const { kind, name } of this.bench.selected) {
       const [x, y] = ((kind === "joint" ? shown.joints : shown.points).find(([one]) => one === name) ?? []).slice(kind === "joint" ? 2 : 1);

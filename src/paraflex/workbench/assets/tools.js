@@ -208,6 +208,7 @@ export class Tools {
     if (held) {
       held.far ||= Math.hypot(px[0] - held.from[0], px[1] - held.from[1]) > CLICK;
       if (held.far && held.drags) this.dragging.send(px, held);
+      else if (held.far && held.under) this.bench.say("The ground stays where it is; the tool Lengths (A) moves its points.");
       if (held.box !== undefined && held.far) held.box = px;
     } else if (this.tool.name === "select" && !this.picking) {
       this.under = this.sheet.hit(...px);

@@ -283,6 +283,7 @@ class Workbench {
   }
 
   pressed(event) {
+    event.stopPropagation(); // a notebook has keys of its own
     const { target, key } = event, field = target.closest?.("input, textarea, select, dialog"), control = event.ctrlKey || event.metaKey;
     if (control) {
       const letter = key.toLowerCase();
