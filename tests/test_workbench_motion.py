@@ -61,7 +61,7 @@ def run(person: Person) -> None:
 
 def finished(person: Person) -> None:
     person.until(
-        "workbench.motion.recordings.run?.revision === workbench.state.revision && workbench.motion.bar.hidden"
+        "workbench.motion.recordings.run?.text === workbench.state.text && workbench.motion.bar.hidden"
     )
 
 

@@ -281,9 +281,9 @@ export class Motion {
 
   // A change of the file: what was computed is of the model before; the next run may begin by itself.
   changed() {
-    const { revision, ready } = this.bench.state, first = this.revision === undefined;
-    if (revision === this.revision) return;
-    this.revision = revision;
+    const { text, ready } = this.bench.state, first = this.text === undefined;
+    if (text === this.text) return;
+    this.text = text;
     this.turner.disabled = this.runner.disabled = !this.bench.state.picture;
     if (first) return;
     this.stop();
@@ -294,13 +294,13 @@ export class Motion {
   }
 
   async turn() {
-    if (this.recordings.turn?.revision === this.bench.state.revision && this.kind !== "turn") { this.choose("turn"); return; }
-    const { revision } = this.bench.state, joint = this.bench.selected.find(({ kind }) => kind === "joint")?.name;
+    if (this.recordings.turn?.text === this.bench.state.text && this.kind !== "turn") { this.choose("turn"); return; }
+    const { text } = this.bench.state, joint = this.bench.selected.find(({ kind }) => kind === "joint")?.name;
     this.turner.disabled = true;
     const found = await this.ask("turn", joint ? { drive: joint } : {});
     this.turner.disabled = false;
     if (!found) return;
-    this.take(await Recording.ofTurn(found, revision));
+    this.take(await Recording.ofTurn(found, text));
     this.settled();
     this.open(true);
   }
@@ -329,9 +329,9 @@ export class Motion {
     if (event.state === "running") { this.progress(event.doing, event.share ?? 0); return; }
     if (event.state === "cancelled") { this.bar.hidden = true; return; }
     if (event.state === "error") { this.bar.hidden = true; this.tell([event.text], "error"); if (this.asked) this.bench.say(event.text, "error"); return; }
-    const { revision } = this.bench.state, recording = await Recording.ofRun(event, revision);
-    if (event.run !== this.number || revision !== this.bench.state.revision) return;
-    if (newer && this.recordings.run && this.recordings.run.revision !== revision) this.before = this.recordings.run;
+    const { text } = this.bench.state, recording = await Recording.ofRun(event, text);
+    if (event.run !== this.number || text !== this.bench.state.text) return;
+    if (newer && this.recordings.run && this.recordings.run.text !== text) this.before = this.recordings.run;
     this.of = event.run;
     if (event.state === "done") this.bar.hidden = true;
     const { tools } = this.bench, free = this.asked || (!tools.held && tools.tool.name === "select" && !(this.kind === "turn" && this.playing));
@@ -340,7 +340,7 @@ export class Motion {
     this.settled();
   }
 
-  settled() { this.bench.parts.dock.classList.toggle("old", this.recording?.revision !== this.bench.state.revision); }
+  settled() { this.bench.parts.dock.classList.toggle("old", this.recording?.text !== this.bench.state.text); }
 
   // Assemblies as small pictures; a click takes one.
   async showAssemblies() {
@@ -433,7 +433,7 @@ export class Motion {
     pen.strokeText(kind, px + 11, py); pen.fillText(kind, px + 11, py);
   }
 
-  get coloursStress() { return this.isPlayed && this.kind === "run" && this.recording.stress?.most > 0 && this.stressed.checked; }
+  get coloursStress() { return this.isPlayed && this.kind === "run" && this.recording.stress?.largest[this.index] > 0 && this.stressed.checked; }
 
   stressColour(share) {
     const stops = STRESS_COLOURS[this.bench.colours.isDark ? "dark" : "light"], at = Math.max(0, Math.min(1, share)) * (stops.length - 1), k = Math.min(Math.floor(at), stops.length - 2);
@@ -461,7 +461,7 @@ export class Motion {
     const { sheet } = this, wide = 150, x = sheet.width - wide - 16, y = sheet.height - 26;
     for (let k = 0; k < wide; k++) { pen.fillStyle = this.stressColour(k / (wide - 1)); pen.fillRect(x + k, y, 1.5, 8); }
     pen.fillStyle = sheet.colour("soft"); pen.font = "12px system-ui, sans-serif"; pen.textBaseline = "bottom"; pen.textAlign = "left"; pen.fillText("0", x, y - 3);
-    pen.textAlign = "right"; pen.fillText(`stress ${quantity(this.recording.stress.most, "Pa")}`, x + wide, y - 3);
+    pen.textAlign = "right"; pen.fillText(`stress ${quantity(this.recording.stress.largest[this.index], "Pa")}`, x + wide, y - 3);
     pen.textAlign = "left";
   }
 }

@@ -78,16 +78,16 @@ function middle(points) {
 
 // What is played: `kind` is "run" or "turn"; `runs` are the names of modes, "" for a motion without.
 export class Recording {
-  static async ofRun(found, revision) {
+  static async ofRun(found, text) {
     const page = await readPage(found.page), film = page.film ? await Film.read(page.film) : null;
-    const stress = found.stress ? { ...found.stress, bytes: await inflated(found.stress.data) } : null;
-    return Object.assign(new Recording(), { kind: "run", found, revision, page, film, stress, trails: [], tables: [], findings: found.findings ?? [], numbers: found.numbers ?? [] });
+    const stress = found.stress ? stressesOf(found.stress, await inflated(found.stress.data)) : null;
+    return Object.assign(new Recording(), { kind: "run", found, text, page, film, stress, trails: [], tables: [], findings: found.findings ?? [], numbers: found.numbers ?? [] });
   }
 
-  static async ofTurn(found, revision) {
+  static async ofTurn(found, text) {
     const page = pageOfTurn(found), film = found.film ? await Film.read(found.film) : null;
     const findings = (found.findings ?? []).map((one) => one.text ?? String(one));
-    return Object.assign(new Recording(), { kind: "turn", found, revision, page, film, stress: null, trails: found.trails ?? [], tables: found.tables ?? [], findings, numbers: [] });
+    return Object.assign(new Recording(), { kind: "turn", found, text, page, film, stress: null, trails: found.trails ?? [], tables: found.tables ?? [], findings, numbers: [] });
   }
 
   get runs() { return this.page.runs; }
@@ -95,12 +95,18 @@ export class Recording {
   get begin() { return this.times[0]; }
   get end() { return this.times[this.times.length - 1]; }
 
-  // Share of the largest stress at each station; NaN where it is not known.
+  // Share of the run's largest stress at each station; NaN where it is not known.
   stressAt(run, time) {
-    const { shape: [, frames, stations], bytes } = this.stress, [before, share] = this.film.at(run, time);
+    const { shape: [, frames, stations], bytes, highest } = this.stress, [before, share] = this.film.at(run, time);
     const start = (run * frames + Math.min(before + Math.round(share), frames - 1)) * stations;
-    return Array.from(bytes.subarray(start, start + stations), (byte) => (byte === 255 ? NaN : byte / 254));
+    return Array.from(bytes.subarray(start, start + stations), (byte) => (byte === 255 ? NaN : byte / highest[run]));
   }
+}
+
+// Stresses in bytes, 255 where none is known, with the largest byte of each run and its stress [Pa].
+function stressesOf({ shape, most }, bytes) {
+  const long = shape[1] * shape[2], highest = Array.from({ length: shape[0] }, (_, run) => bytes.subarray(run * long, (run + 1) * long).reduce((found, one) => (one < 255 && one > found ? one : found), 1));
+  return { shape, bytes, highest, largest: highest.map((one) => (most * one) / 254) };
 }
 
 const UNIT_STEPS = [[1e3, "k"], [1, ""], [1e-3, "m"]];

@@ -60,7 +60,7 @@ export class Seeing {
 
   // Distances from singular positions, as bars that are full far away from them.
   bars(seen) {
-    const bars = [["reach (serial)", seen.serial, "of the end-effector (serial, type I)"], ["motors (parallel)", seen.parallel, "of these motors (parallel, type II)"]].filter(([, value]) => value !== null && value !== undefined);
+    const bars = [["reach", seen.serial, "of the end-effector (serial, type I)"], ["motors", seen.parallel, "of these motors (parallel, type II)"]].filter(([, value]) => value !== null && value !== undefined);
     this.put("singular", "From singular", bars.length ? "." : "", "");
     const { value } = this.rows.get("singular");
     value.replaceChildren(...bars.map(([word, share, help]) => {
