@@ -624,3 +624,16 @@ def test_fields_of_all_members_are_plain_data(name):
         assert json.loads(json.dumps(found, allow_nan=False)) == found
         for row in found["fields"]:
             assert value_at(tomllib.loads(text), row["place"]) is not None
+
+
+def test_a_driven_crank_begins_where_a_person_puts_it():
+    begins = ("prescribed", "drive", "angle")
+    text = library_file("four_bar").read_text(encoding="utf-8")
+    moved = Sheet(apply(text, {"kind": "move-point", "ref": "crank.A", "to": [0.0, 0.12]}).text)
+    assert moved.number(begins) == pytest.approx(math.pi / 2.0, abs=1e-5)
+    begun = posed(moved.model.mechanism)
+    assert begun.closes
+    assert begun.place(pf.PointRef("crank", "A")) == pytest.approx([0.0, 0.12], abs=1e-5)
+    turned = {**begun.angles, "crank": begun.angles["crank"] + 0.25}
+    kept = Sheet(apply(moved.text, {"kind": "pose", "angles": turned}).text)
+    assert kept.number(begins) == pytest.approx(math.pi / 2.0 + 0.25, abs=1e-5)

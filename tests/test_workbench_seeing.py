@@ -21,7 +21,7 @@ from paraflex.workbench.document import Document
 from paraflex.workbench.moving import Mover
 from paraflex.workbench.readiness import checked
 from paraflex.workbench.seeing import Seeing
-from paraflex.workbench.session import Session
+from paraflex.workbench.session import EditSession
 
 G = 9.81
 ARM = f"""
@@ -444,7 +444,7 @@ def grown(text, step):
 @pytest.fixture
 def session(tmp_path):
     """A session with the empty sheet."""
-    session = Session(Document(drafts=tmp_path), lambda _: None)
+    session = EditSession(Document(drafts=tmp_path), lambda _: None)
     yield session
     session.close()
 

@@ -12,6 +12,7 @@ from paraflex.mechanism.joints import GROUND
 from paraflex.mechanism.poses import Pose
 from .dependents import Use, falling, replaced, spelt, thing_of, uses
 from .edits import renamed, with_value, written
+from .moving_points import with_starts
 from .sheet import XY, Action, Done, Sheet, check_name, near, placed, tidy
 
 # Length by which the inertia of a block is that of a rod [m].
@@ -144,7 +145,13 @@ def pose(sheet: Sheet, action: Action) -> Done:
         points = {ref: place for ref, place in points.items() if ref in given.get("points", {})}
     for ref, place in points.items():
         sheet = sheet.put(("assembly", name, "points", ref), [float(each) for each in place])
-    return sheet, f"assembly.{name}"
+    known = before.frames(name) if name == before.shown else {}
+    turns = {
+        body: near(float(angle), known[body].angle) - known[body].angle
+        for body, angle in angles.items()
+        if body in known
+    }
+    return with_starts(sheet, turns), f"assembly.{name}"
 
 
 def copied(sheet: Sheet, action: Action) -> Done:

@@ -1,6 +1,7 @@
 """The action that moves a point: the numbers behind its place change in the way in which they are written."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from math import cos, hypot, isclose, sin
 from typing import Any
 
@@ -36,6 +37,7 @@ def move_point(sheet: Sheet, action: Action) -> Done:
             sheet, turns[body] = _with_body(sheet, before, body, point, (to[0], to[1]), assembly)
     for joint in before.joints:
         sheet = _with_directions(sheet, joint, turns)
+    sheet = with_starts(sheet, turns)
     for body, turn in turns.items():
         old = value_at(sheet.data, ("assembly", assembly, body))
         if turn and old is not None and not (isinstance(old, str) and names_in(old) & sheet.parameters.keys()):
@@ -47,6 +49,19 @@ def move_point(sheet: Sheet, action: Action) -> Done:
         if value_at(sheet.data, ("assembly", assembly, "points", each)) is not None:
             sheet = sheet.put(("assembly", assembly, "points", each), list(to))
     return sheet, f"ground.{ref.partition('.')[2]}" if ref.startswith(f"{GROUND}.") else f"body.{ref.partition('.')[0]}"
+
+
+def with_starts(sheet: Sheet, turns: Mapping[str, float]) -> Sheet:
+    """Let prescribed motions begin at the angles to which bodies have turned; laws of the time stay as they are."""
+    joints = {joint.name: joint for joint in sheet.joints}
+    for name in sheet.names("prescribed"):
+        place = ("prescribed", name, "angle")
+        joint = joints.get(str(value_at(sheet.data, ("prescribed", name, "joint"))))
+        if joint is not None and value_at(sheet.data, place) is not None:
+            change = turns.get(joint.b.body, 0.0) - turns.get(joint.a.body, 0.0)
+            with suppress(InputError):
+                sheet = with_number(sheet, place, sheet.number(place) + change)
+    return sheet
 
 
 def joined_to(sheet: Sheet, ref: str) -> list[str]:
