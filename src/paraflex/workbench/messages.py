@@ -40,6 +40,11 @@ def numbers(message: Any, name: str, count: int) -> list[float]:
     return [float(one) for one in found]
 
 
+def table(value: Any, name: str) -> dict[str, Any]:
+    """Return a value of a message that is a table; see `field` for the errors."""
+    return field({name: value}, name, dict)
+
+
 def keys(message: Any, name: str) -> list[str | int]:
     """Return a field of a message that is a place in the file: keys and indices; see `field` for the errors."""
     found = field(message, name, list)

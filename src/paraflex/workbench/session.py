@@ -17,7 +17,7 @@ from .bending import drag_force, linear
 from .document import EMPTY, Document
 from .items import fields, outline
 from .leaving import figures, film, link, report, text_of_link
-from .messages import Message, described, field, finite, keys, numbers, one_of
+from .messages import Message, described, field, finite, keys, numbers, one_of, table
 from .picture import looks
 from .programs import program
 from .readiness import checked
@@ -28,6 +28,10 @@ from .turning import turning
 _WITHOUT_PLACES = ("set", "unset", "rename", "delete", "pose")
 # Requests that take seconds, and do not hold others up.
 SLOW = ("leave",)
+
+
+def _names_places(action: Any) -> bool:
+    return not isinstance(action, dict) or action.get("kind") not in _WITHOUT_PLACES
 
 
 class EditSession:
@@ -104,15 +108,21 @@ class EditSession:
         return self._changed(field(message, "text", str))
 
     def _do_act(self, message: Message) -> Message:
-        action, text = field(message, "action", dict), self.document.text
-        if self.bench.is_moved and action.get("kind") not in _WITHOUT_PLACES:
+        """Apply an action, or several `actions` as one step, in which "@" is what the one before has made."""
+        actions = field(message, "actions", list) if "actions" in message else [field(message, "action", dict)]
+        text, selected, notes = self.document.text, "", []
+        if self.bench.is_moved and any(_names_places(one) for one in actions):
             # Places on the page are those of the pose that it shows.
             text = self._posed()
-        edited = apply(text, action, self.document.folder)
+        for action in actions:
+            given = {key: selected if value == "@" else value for key, value in table(action, "actions").items()}
+            edited = apply(text, given, self.document.folder)
+            text, selected = edited.text, edited.selected
+            notes += [edited.note] if edited.note else []
         # What a slider changes while it is moved is one step.
         live, self._live = self._live, message.get("live")
-        self.document.change(edited.text, same=live is not None and live == self._live)
-        return {**self._renewed(), "selected": edited.selected, "note": edited.note}
+        self.document.change(text, same=live is not None and live == self._live)
+        return {**self._renewed(), "selected": selected, "note": "; ".join(notes)}
 
     def _posed(self) -> str:
         """Return the text with the present pose as the assembly."""

@@ -58,8 +58,8 @@ export class Drawing {
   // A point of the ground; on a point of a link it holds that.
   async addGround(place) {
     if (place.ref?.startsWith("ground.")) { this.bench.select({ kind: "point", name: place.ref }); return; }
-    const found = await this.bench.act({ kind: "add-ground", at: place.at });
-    if (found && place.ref) await this.bench.act({ kind: "add-joint", type: "revolute", a: found.selected, b: place.ref });
+    const joint = place.ref ? [{ kind: "add-joint", type: "revolute", a: "@", b: place.ref }] : [];
+    await this.bench.actAll({ kind: "add-ground", at: place.at }, ...joint);
   }
 
   // The ref of a place: a point that is there, or a new one on the link below it.
@@ -135,7 +135,7 @@ export class Drawing {
   async convert(joint, type) {
     const { fields } = await this.bench.link.ask("fields", { place: ["joint", joint] });
     const [a, b] = fields.map(({ text }) => text).filter((text) => /^[^.\s]+\.[^.\s]+$/.test(text) && isNaN(text));
-    if (await this.bench.act({ kind: "delete", names: [`joint.${joint}`] })) this.bench.act({ kind: "add-joint", type, a, b, name: joint });
+    this.bench.actAll({ kind: "delete", names: [`joint.${joint}`] }, { kind: "add-joint", type, a, b, name: joint });
   }
 
   // A block on a rail; on a point that lies on another link a slot along that link.

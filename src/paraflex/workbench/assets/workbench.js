@@ -191,6 +191,8 @@ class Workbench {
 
   // What a person does: an action on the text; a refusal is shown, and null returned.
   async act(action, more = {}) { return this.request("act", { action, ...more }); }
+  // Several actions as one step; "@" stands for what the one before has made.
+  async actAll(...actions) { return this.request("act", { actions }); }
 
   async step(which) {
     await this.text.flush();
