@@ -41,8 +41,8 @@ COUNT = """() => {
 }"""
 CHANGE = """async ([place, text]) => {
     const began = performance.now();
-    const state = await workbench.link.ask("act", { action: { kind: "set", place, text } });
-    if (!state.seen || (state.seen.held ?? []).length === 0) throw new Error("no held frequencies");
+    const state = await workbench.request("act", { action: { kind: "set", place, text } });
+    if (!state?.seen || (state.seen.held ?? []).length === 0) throw new Error("no held frequencies");
     return (performance.now() - began) / 1000;
 }"""
 RUN = """async () => {

@@ -248,13 +248,13 @@ class TestFreedoms:
     def test_reach_of_a_path(self):
         line = '[path.up]\ntype = "line"\nstart = [0.0, {}]\nend = [0.0, {}]\nmax_acceleration = 10.0\n'
         text = library_text("five_bar").replace('path = "square"', 'path = "up"') + line.format(0.3, 0.6)
-        model, q = read(text)
+        model, _ = read(text)
         limit = math.sqrt(0.5**2 - 0.1**2)
-        path = np.array(Seeing(model).full(q, "++")["path"])
+        path = np.array(Seeing(model).reach("++"))
         assert np.array_equal(path[:, 2] > 0, path[:, 1] < limit)
         assert 0 < np.sum(path[:, 2] > 0) < len(path)
-        model, q = read(text.replace("0.6]", "0.48989]"))
-        path = np.array(Seeing(model).full(q, "++")["path"])
+        model, _ = read(text.replace("0.6]", "0.48989]"))
+        path = np.array(Seeing(model).reach("++"))
         assert path[0, 2] == 1
         assert path[-1, 2] == 2
 
@@ -451,8 +451,11 @@ def session(tmp_path):
 
 def ready(session, text):
     """The sentence and the tool that a text leads to."""
-    found = session.answer({"id": 1, "do": "text", "text": text})["ok"]["ready"]
-    return found
+    state = session.answer({"id": 1, "do": "text", "text": text})["ok"]
+    seen = state["seen"] or {}
+    return (
+        state["ready"] if seen.get("path", []) is not None else session.answer({"id": 2, "do": "reach"})["ok"]["ready"]
+    )
 
 
 class TestReadiness:

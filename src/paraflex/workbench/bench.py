@@ -45,6 +45,7 @@ class Bench:
         self._open: Posed | None = None
         self._mover: Mover | None = None
         self._seeing: Seeing | None = None
+        self._seen: dict[str, Any] | None = None
         self._found: list[Any] = []
         self._moved, self._assembly = False, ""
         self._view: Limits | None = None
@@ -145,7 +146,10 @@ class Bench:
         if self._seeing is None or self._mover is None:
             return None
         q = self._mover.q
-        return self._seeing.quick(q, self.mode) if quick else self._seeing.full(q, self.mode)
+        if quick:
+            return self._seeing.quick(q, self.mode)
+        self._seen = self._seeing.full(q, self.mode)
+        return self._seen
 
     def state(self) -> Message:
         """Return what a page shows of the model."""
@@ -158,8 +162,18 @@ class Bench:
             "moved": self._moved,
             "mode": self.mode,
             "seen": seen,
-            "ready": readiness(self.model, self.problem, seen, {} if self._open is None else dict(self._open.gaps)),
+            "ready": self._ready(seen),
         }
+
+    def _ready(self, seen: dict[str, Any] | None) -> Message:
+        return readiness(self.model, self.problem, seen, {} if self._open is None else dict(self._open.gaps))
+
+    def reach(self) -> Message:
+        """Return where the path is reached, which takes longer than other numbers, and whether a run may begin."""
+        if self._seeing is None or self._seen is None:
+            return {"path": [], "ready": self._ready(None)}
+        path = self._seeing.reach(self.mode)
+        return {"path": path, "ready": self._ready({**self._seen, "path": path})}
 
     def choose_mode(self, name: str) -> Message:
         """Choose the mode whose motors hold and drive."""

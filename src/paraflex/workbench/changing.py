@@ -1,7 +1,8 @@
 """Actions that change, rename, copy and delete what is there."""
 
 from collections.abc import Callable, Mapping, Sequence
-from math import dist, pi
+from contextlib import suppress
+from math import dist, isfinite, pi
 from typing import Any
 
 from paraflex.errors import InputError
@@ -37,7 +38,15 @@ def set_value(sheet: Sheet, action: Action) -> Done:
     after = sheet.with_text(with_value(sheet.text, place, text))
     if place[0] == "body" and place[2:] == ("mass",) and value_at(sheet.data, (*place[:2], "inertia")) is None:
         after = _with_inertia(after, place[:2])
-    return placed(before, after), ".".join(map(str, place[:2]))
+    # Numbers decide nowhere which places are determined.
+    is_number = _is_number(before, place) and _is_number(after, place)
+    return after if is_number else placed(before, after), ".".join(map(str, place[:2]))
+
+
+def _is_number(sheet: Sheet, place: Place) -> bool:
+    with suppress(InputError):
+        return isfinite(sheet.number(place))
+    return False
 
 
 def _in_full(sheet: Sheet, place: Place) -> Sheet:

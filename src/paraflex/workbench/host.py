@@ -7,7 +7,7 @@ import socket
 from collections.abc import AsyncIterator, Callable
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import asynccontextmanager, suppress
-from contextvars import copy_context
+from contextvars import ContextVar, copy_context
 from typing import Any
 
 import uvicorn
@@ -18,7 +18,6 @@ from starlette.routing import Route, WebSocketRoute
 from starlette.websockets import WebSocket, WebSocketDisconnect
 
 from .document import Document
-from .messages import finite
 from .page import module, page, style
 from .session import SLOW, EditSession
 
@@ -37,6 +36,9 @@ _MADE_POLICY = (
     "default-src 'none'; script-src 'unsafe-inline' 'unsafe-eval'; style-src 'unsafe-inline'; img-src data: blob:; "
     "font-src data:"
 )
+
+# Replies to the page whose message is being answered; None when a file has changed.
+_ASKING: ContextVar[Any] = ContextVar("replies to the page that asks", default=None)
 
 
 class Host:
@@ -138,21 +140,25 @@ class Host:
         """Have a message answered after those before it; slow ones after other slow ones."""
         slow = isinstance(message, dict) and message.get("do") in SLOW
         loop = asyncio.get_running_loop()
-        future = loop.run_in_executor(self._slow if slow else self._worker, self._answered, message)
+        future = loop.run_in_executor(self._slow if slow else self._worker, self._answered, message, replies)
         future.add_done_callback(lambda done: done.cancelled() or replies.put_nowait(done.result()))
 
-    def _answered(self, message: Any) -> dict[str, Any]:
-        return self._context.copy().run(self.session.answer, message)
+    def _answered(self, message: Any, replies: "asyncio.Queue[dict[str, Any]]") -> dict[str, Any]:
+        context = self._context.copy()
+        context.run(_ASKING.set, replies)
+        return context.run(self.session.answer, message)
 
     def _send(self, event: dict[str, Any]) -> None:
-        """Send an event to all pages, from any thread."""
+        """Send an event to all pages, from any thread; the state of a document is in the reply to who changed it."""
+        asking = _ASKING.get() if event["event"] == "state" else None
         if self._loop is not None:
             with suppress(RuntimeError):
-                self._loop.call_soon_threadsafe(self._put, event)
+                self._loop.call_soon_threadsafe(self._put, event, asking)
 
-    def _put(self, event: dict[str, Any]) -> None:
+    def _put(self, event: dict[str, Any], asking: "asyncio.Queue[dict[str, Any]] | None") -> None:
         for replies in self._pages.values():
-            replies.put_nowait(event)
+            if replies is not asking:
+                replies.put_nowait(event)
 
     @asynccontextmanager
     async def _alive(self, _: Starlette) -> AsyncIterator[None]:
@@ -174,7 +180,7 @@ class Host:
 
 async def _send_all(page: WebSocket, replies: "asyncio.Queue[dict[str, Any]]") -> None:
     while True:
-        await page.send_text(json.dumps(finite(await replies.get()), allow_nan=False))
+        await page.send_text(json.dumps(await replies.get(), allow_nan=False))
 
 
 def _parsed(text: str) -> Any:

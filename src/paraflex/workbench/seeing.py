@@ -116,12 +116,18 @@ class Seeing:
 
         `held` and `unheld` are the lowest natural frequencies with all motors held, and free [Hz]; `compliance` of the
         end-effector with motors held has semi-axes `sizes` [m/N] and the direction `angle` of the larger [rad];
-        `chips` have name, motors, number of freedoms driven, and what is lacking; `path` has places of the study's path
-        as [x, y, reach]: 0 out of reach, 1 reached, 2 near a singular position.
+        `chips` have name, motors, number of freedoms driven, and what is lacking; `path` is that of `reach`, None if it
+        has not been asked for.
         """
         found = self.quick(q, mode)
         why, massless = found["why"], self.massless
-        found |= {"held": None, "unheld": None, "compliance": None, "chips": self._chips(q), "path": self._path(mode)}
+        found |= {
+            "held": None,
+            "unheld": None,
+            "compliance": None,
+            "chips": self._chips(q),
+            "path": self._known_reach(mode),
+        }
         if massless:
             return {**found, "why": {**why, "held": massless, "compliance": massless}}
         try:
@@ -209,16 +215,22 @@ class Seeing:
             out.append({"name": mode.name, "motors": list(mode.motors), "drives": driven, "lacks": lacks})
         return out
 
-    def _path(self, mode: str) -> list[list[float]]:
-        """Return the places of the study's path and whether they are reached; empty if it cannot be tried."""
-        if self._mechanism.end_effector is None or not self._model.paths:
-            return []
-        name = self._model.path_name()
-        if (name, mode) not in self._paths:
-            self._paths[name, mode] = []
+    def _known_reach(self, mode: str) -> list[list[float]] | None:
+        is_planned = self._mechanism.end_effector is not None and self._model.paths
+        return self._paths.get((self._model.path_name(), mode)) if is_planned else []
+
+    def reach(self, mode: str) -> list[list[float]]:
+        """Return places of the study's path as [x, y, reach]: 0 out of reach, 1 reached, 2 near a singular position.
+
+        There are none if the path cannot be tried.
+        """
+        found = self._known_reach(mode)
+        if found is None:
+            found, name = list[list[float]](), self._model.path_name()
             with suppress(ParaflexError):
-                self._paths[name, mode] = self._reached(self._model.path(name), mode)
-        return self._paths[name, mode]
+                found = self._reached(self._model.path(name), mode)
+            self._paths[name, mode] = found
+        return found
 
     def _reached(self, path: Path, mode: str) -> list[list[float]]:
         mechanism = with_any_masses(self._model.mechanism)

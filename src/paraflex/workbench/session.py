@@ -189,6 +189,9 @@ class EditSession:
     def _do_mode(self, message: Message) -> Message:
         return self.bench.choose_mode(field(message, "name", str))
 
+    def _do_reach(self, _: Message) -> Message:
+        return self.bench.reach()
+
     def _do_turn(self, message: Message) -> Message:
         given = {name: message[name] for name in ("drive", "speed") if message.get(name) is not None}
         return turning(self.bench.known_model, assembly=self.bench.assembly, **given)
@@ -200,7 +203,7 @@ class EditSession:
         assert self._runner is not None
         request = {"text": self.document.text, "folder": self.document.folder, "source": self.document.name}
         request |= {name: field(message, name, list) for name in ("modes",) if message.get(name)}
-        return {"run": self._runner.start(request, lambda event: self._send({"event": "run", **event}))}
+        return {"run": self._runner.start(request, lambda event: self._send(finite({"event": "run", **event})))}
 
     def _do_check(self, _: Message) -> Message:
         return checked(self.bench.known_model)

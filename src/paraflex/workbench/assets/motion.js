@@ -24,6 +24,7 @@ export class Motion {
     bench.link.on("run", (event) => this.ran(event));
     bench.link.on("end", () => this.pause());
     bench.on("state", () => this.changed());
+    bench.on("reach", () => this.runOfItself());
     bench.colours.listeners.push(() => { for (const chart of this.charts) chart.paint(); });
   }
 
@@ -281,7 +282,7 @@ export class Motion {
 
   // A change of the file: what was computed is of the model before; the next run may begin by itself.
   changed() {
-    const { text, ready } = this.bench.state, first = this.text === undefined;
+    const { text } = this.bench.state, first = this.text === undefined;
     if (text === this.text) return;
     this.text = text;
     this.turner.disabled = this.runner.disabled = !this.bench.state.picture;
@@ -289,7 +290,14 @@ export class Motion {
     this.stop();
     this.bar.hidden = true;
     this.bench.parts.dock.classList.toggle("old", !!this.recording);
-    if (this.auto.checked && ready?.ok) this.run(false);
+    this.due = true;
+  }
+
+  // The run after a change, once it is known whether it can be made.
+  runOfItself() {
+    if (!this.due) return;
+    this.due = false;
+    if (this.auto.checked && this.bench.state.ready?.ok) this.run(false);
     else if (this.number >= 0) this.bench.link.ask("cancel").catch(() => null);
   }
 

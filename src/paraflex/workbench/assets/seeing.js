@@ -88,6 +88,7 @@ export class Seeing {
     if (!found) return;
     Object.assign(this.bench.state, { mode: found.mode ?? name, seen: { ...this.bench.state.seen, ...found.seen, mode: name } });
     this.bench.notify("picture");
+    this.bench.reach();
     this.bench.motion?.chooseMode(name);
   }
 
@@ -130,9 +131,12 @@ export class Seeing {
     if (left) this.sheet.repaint();
   }
 
+  // Places of the path and their reach; until it is known again, that before.
+  get path() { return (this.reached = this.bench.state.seen?.path ?? this.reached ?? []); }
+
   // The path in stretches of one reach each; a path that was not tried in grey.
   paintPath(pen) {
-    const path = this.bench.state.seen?.path ?? [];
+    const { path } = this;
     pen.lineCap = "butt"; pen.lineJoin = "round";
     if (!path.length) {
       const line = this.bench.state.picture.path ?? [];
@@ -156,7 +160,7 @@ export class Seeing {
   }
 
   paintLegend(pen) {
-    const path = this.bench.state.seen?.path ?? [];
+    const { path } = this;
     if (!path.length) return;
     const used = REACHES.map((one, reach) => [one, reach]).filter(([, reach]) => path.some((place) => place[2] === reach));
     pen.font = "12px system-ui, sans-serif"; pen.textBaseline = "middle"; pen.textAlign = "right";

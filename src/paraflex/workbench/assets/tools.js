@@ -47,7 +47,7 @@ export class Tools {
     canvas.addEventListener("pointerleave", () => { if (!this.held) { this.hover = null; this.sheet.repaint(); } });
     canvas.addEventListener("contextmenu", (event) => event.preventDefault());
     canvas.addEventListener("dblclick", (event) => this.doubled(event));
-    bench.on("state", () => this.showReady());
+    for (const what of ["state", "reach"]) bench.on(what, () => this.showReady());
     this.choose("select");
   }
 

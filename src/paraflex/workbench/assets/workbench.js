@@ -31,7 +31,7 @@ class Workbench {
     this.state = { text: "", picture: null, revision: -1 };
     this.looks = {};
     this.selected = []; // [{kind, name}], kinds as of outline and picture
-    this.listeners = { state: [], selected: [], picture: [] };
+    this.listeners = { state: [], selected: [], picture: [], reach: [] };
     this.tabs = new Map();
     this.link.on("state", ({ state }) => this.take(state));
     this.link.on("end", ({ text }) => this.say(text, "error"));
@@ -129,7 +129,20 @@ class Workbench {
     this.state = state;
     this.selected = this.selected.filter(({ kind, name }) => this.exists(kind, name));
     this.notify("state");
+    this.reach();
     if (empty && this.isDrawn && !this.tools.isDrawing) this.sheet.fit();
+  }
+
+  // Where the path is reached takes longer than other numbers; what waits for it is notified in any case.
+  async reach() {
+    const { state } = this;
+    if (state.seen && !state.seen.path) {
+      const found = await this.link.ask("reach").catch(() => ({ path: [], ready: state.ready }));
+      if (state !== this.state) return;
+      state.seen.path = found.path;
+      state.ready = found.ready;
+    }
+    this.notify("reach");
   }
 
   // Whether the sheet has any link.
