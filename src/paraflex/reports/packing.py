@@ -2,6 +2,9 @@
 
 import base64
 import zlib
+from collections.abc import Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
 from dataclasses import dataclass, field
 from itertools import product
 from typing import Any
@@ -16,6 +19,19 @@ MISSING, _LARGEST_CODE = -32768, 32767
 _DROPPED = 6
 # Highest order of differences over frames, and over points; and half the number of frames that decide.
 _HIGHEST, _FEW = 3, 16
+# Levels of compression for files, and for a page on this machine, which also does not search for the best orders.
+_SMALL, _QUICK, _QUICK_ORDERS = 6, 1, (2, 0)
+_LEVEL: ContextVar[int] = ContextVar("level of compression", default=_SMALL)
+
+
+@contextmanager
+def quickly() -> Iterator[None]:
+    """Provide a context in which numbers are packed in less time and need more space."""
+    token = _LEVEL.set(_QUICK)
+    try:
+        yield
+    finally:
+        _LEVEL.reset(token)
 
 
 @dataclass
@@ -67,14 +83,18 @@ def packed(values: ArrayLike) -> dict[str, Any]:
     whole = np.full(array.shape, MISSING, dtype="<i2")
     known = np.isfinite(array).all(axis=-1)
     whole[known] = np.rint((array[known] - offset) / scale)
-    # A few frames in the middle show which orders suit.
-    middle = array.shape[1] // 2
-    few = whole[:, max(0, middle - _FEW) : middle + _FEW]
-    choices = product(range(_HIGHEST + 1), range(_HIGHEST + 1) if array.ndim > 3 else [0])
-    orders = min(choices, key=lambda each: _bits(_differences(few, each)))
+    orders = _QUICK_ORDERS if _LEVEL.get() == _QUICK else _best_orders(whole)
     signed = _differences(whole, orders)
     data = _deflated(((signed << 1) ^ (signed >> 15)).astype("<i2").view(np.uint8).reshape(-1, 2))
     return {"shape": list(array.shape), "offset": offset.tolist(), "scale": scale, "orders": orders, "data": data}
+
+
+def _best_orders(whole: NDArray[np.int16]) -> tuple[int, int]:
+    """Return the orders with which differences are smallest, by a few frames in the middle."""
+    middle = whole.shape[1] // 2
+    few = whole[:, max(0, middle - _FEW) : middle + _FEW]
+    choices = product(range(_HIGHEST + 1), range(_HIGHEST + 1) if whole.ndim > 3 else [0])
+    return min(choices, key=lambda each: _bits(_differences(few, each)))
 
 
 def _differences(whole: NDArray[np.int16], orders: tuple[int, int]) -> NDArray[np.int16]:
@@ -97,4 +117,4 @@ def _deflated(numbers: NDArray[np.uint8]) -> str:
 
 def deflated(data: bytes) -> str:
     """Compress bytes to base64."""
-    return base64.b64encode(zlib.compress(data, 6)).decode("ascii")
+    return base64.b64encode(zlib.compress(data, _LEVEL.get())).decode("ascii")

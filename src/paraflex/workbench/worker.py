@@ -20,8 +20,10 @@ from paraflex.interrupts import end_with_parent
 
 # Number of no request, and states of events for the host alone.
 NO_REQUEST, READY, BEGUN, ENDED = 0, "ready", "begun", "ended"
-# Time between two reports of progress, and that of a coarse run which is not worth showing [s].
-_OFTEN, _QUICK = 0.1, 0.25
+# Times between two reports of progress, of a coarse run which is not worth showing, and of a run before which none is
+# made; and times of the last runs by mechanism and modes [s].
+_OFTEN, _QUICK, _SHORT = 0.1, 0.25, 0.6
+_taken: dict[Any, float] = {}
 # Library mechanisms whose coarse runs load the kernels of each geometry.
 _WARMING = ("five_bar", "raparm_i")
 
@@ -128,6 +130,7 @@ def _answer(request: dict[str, Any], send: Send, stale: Stale, *, only_coarse: b
     from paraflex.compilation import compile_kernels_for
     from paraflex.files import allowing_outside
     from paraflex.formatting import output_units
+    from paraflex.reports.packing import quickly
     from .computing import computed, model_of
     from .shown import shown
 
@@ -136,15 +139,19 @@ def _answer(request: dict[str, Any], send: Send, stale: Stale, *, only_coarse: b
         model = model_of(request["text"], Path(folder) if folder else None, request.get("source") or "model")
     compile_kernels_for(model.mechanism, lambda text: send({"state": "running", "doing": text, "share": 0.0}))
     modes, path = tuple(request.get("modes") or ()), request.get("path") or None
-    for coarse in (True, False)[: 1 if only_coarse else 2] if request.get("preview", True) else (False,):
+    of = request.get("source"), len(model.mechanism.bodies), modes or model.study.modes
+    previews = request.get("preview", True) and (only_coarse or _taken.get(of, _SHORT) >= _SHORT)
+    for coarse in (True, False)[: 1 if only_coarse else 2] if previews else (False,):
         started, watch = time.perf_counter(), _watching(send, stale, "a first look" if coarse else "the run")
         found = computed(model, modes, path, coarse=coarse, on_progress=watch)
         if coarse and not only_coarse and time.perf_counter() - started < _QUICK:
             continue
-        with output_units(model.parameters.get("units", {}).values()):
+        with quickly(), output_units(model.parameters.get("units", {}).values()):
             event = {"state": "preview" if coarse else "done"} | ({} if stale() else shown(found, charts=not coarse))
         if stale():
             return
+        if not coarse:
+            _taken[of] = time.perf_counter() - started
         accuracy = {"coarse": coarse, "tolerance": found.tolerance, "samples": found.samples}
         send(event | {"accuracy": accuracy, "seconds": time.perf_counter() - began})
 
