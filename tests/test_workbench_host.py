@@ -204,6 +204,19 @@ def test_a_file_changed_by_another_program_is_taken_up(model, tmp_path):
         assert not talk.ok("open")["saved"]
 
 
+def test_a_save_does_not_overwrite_what_another_program_has_just_written(tmp_path):
+    file, other = tmp_path / "mine.toml", FIVE_BAR + "# theirs\n"
+    file.write_text(FIVE_BAR, encoding="utf-8")
+    session = EditSession(Document(str(file), drafts=tmp_path), lambda _: None)
+    session.answer({"id": 1, "do": "text", "text": FIVE_BAR + "# mine\n"})
+    file.write_text(other, encoding="utf-8")
+    assert "another program" in session.answer({"id": 2, "do": "save"})["ok"]["note"]
+    assert file.read_text(encoding="utf-8") == session.document.text == other
+    assert session.answer({"id": 3, "do": "undo"})["ok"]["text"] == FIVE_BAR + "# mine\n"
+    assert "ok" in session.answer({"id": 4, "do": "save"})
+    assert file.read_text(encoding="utf-8") == FIVE_BAR + "# mine\n"
+
+
 def test_the_server_ends_with_its_last_page(tmp_path):
     with served("five_bar", folder=tmp_path) as (child, address):
         one, other = Talk(address), Talk(address)

@@ -145,7 +145,11 @@ class EditSession:
         return self._renewed()
 
     def _do_save(self, message: Message) -> Message:
-        self.document.save(None if message.get("name") is None else field(message, "name", str))
+        name = None if message.get("name") is None else field(message, "name", str)
+        if name is None and self.document.take_up():
+            note = "Not saved: another program has just changed the file. Its text is shown; Undo returns to yours."
+            return {**self._renewed(), "note": note}
+        self.document.save(name)
         return self._renewed()
 
     def _do_start(self, message: Message) -> Message:

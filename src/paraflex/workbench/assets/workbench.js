@@ -242,7 +242,8 @@ class Workbench {
   async save(name) {
     await this.text.flush();
     if (name === undefined && !this.state.file) return this.askName();
-    if (await this.request("save", name === undefined ? {} : { name })) this.say(`Saved as ${this.state.file}`);
+    const found = await this.request("save", name === undefined ? {} : { name });
+    if (found && !found.note) this.say(`Saved as ${this.state.file}`);
     return null;
   }
 
