@@ -179,6 +179,11 @@ class Mover:
         found = {str(ref): marker_position(self.system, self.system.marker(ref), self.q) for ref in refs}
         return {name: (float(x), float(y)) for name, (x, y) in found.items()}
 
+    def travels(self) -> dict[str, float]:
+        """Return the travels of all sliding joints with prescribed motions at the present pose [m]."""
+        sliding = [one.joint for one in self.mechanism.prescribed if self.mechanism.slides(one.joint)]
+        return {name: joint_value(self.system, name, self.q) for name in sliding}
+
     def release(self) -> None:
         """End the present drag; the next one begins from the present pose."""
         self._drag = None
