@@ -14,7 +14,9 @@ from paraflex.files import load
 from paraflex.results import motion_dataset
 from paraflex.results.posed import posed
 from paraflex.workbench.computing import model_of
+from paraflex.workbench.document import Document
 from paraflex.workbench.moving import Mover, assemblies
+from paraflex.workbench.session import EditSession
 from paraflex.workbench.turning import turning
 
 
@@ -355,3 +357,46 @@ def test_the_pose_is_that_in_which_a_run_begins(name):
     model = load(name)
     begun = posed(model.mechanism, model.study.assembly)
     assert Mover(model.mechanism, model.study.assembly).angles() == pytest.approx(begun.angles, abs=1e-9)
+
+
+SLIDER_DRIVEN = """
+name = "slider driven"
+[ground]
+O = [0, 0]
+R = ["-100 mm", 0]
+[body.crank]
+points = { O = [0, 0], A = ["100 mm", 0] }
+[body.rod]
+points = { A = [0, 0], B = ["300 mm", 0] }
+[body.block]
+points = { B = [0, 0] }
+[joint]
+O = ["ground.O", "crank.O"]
+A = ["crank.A", "rod.A"]
+B = ["rod.B", "block.B"]
+S = { type = "prismatic", points = ["ground.R", "block.B"] }
+[prescribed.push]
+joint = "S"
+displacement = "450 mm"
+speed = -0.1
+[assembly.drawn]
+crank = 0.8
+rod = -0.3
+block = 0
+"""
+
+
+def test_a_slider_that_drives_begins_where_the_pose_is_kept(tmp_path):
+    session = EditSession(Document(text=SLIDER_DRIVEN, drafts=tmp_path), lambda _: None)
+    mover = session.bench.mover
+    assert mover.places()["block.B"] == pytest.approx([0.35, 0.0], abs=1e-9)
+    session.bench.drag("crank", "A", [0.0, 0.1])
+    kept = mover.places()
+    assert "ok" in session.answer({"id": 1, "do": "pose"})
+    assert 'displacement = "' in session.document.text
+    again = EditSession(Document(text=session.document.text, drafts=tmp_path), lambda _: None).bench.mover
+    for name, place in again.places().items():
+        assert place == pytest.approx(kept[name], abs=1e-6)
+    assert kept["block.B"][0] == pytest.approx(math.sqrt(0.3**2 - 0.1**2), abs=1e-6)
+    assert "ok" in session.answer({"id": 2, "do": "undo"})
+    assert session.document.text == SLIDER_DRIVEN
