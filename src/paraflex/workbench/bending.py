@@ -40,7 +40,8 @@ def drag_force(model: Model, q: Array, ref: str, force: Sequence[float], *, buck
     `place` of the deflected point [m], and its `deflection` by the force; `stiffness`, the force over the deflection
     along it [N/m], None without a force or if nothing yields; `buckling`, the factor of the force at which the
     mechanism buckles, None if it does not or is not asked for, as limit points beyond the force are searched;
-    `buckling_note`, how far it is an estimate; and `findings`, a line each. InputError: the point is unknown, nothing bends, or the motors do not hold the mechanism.
+    `buckling_note`, how far it is an estimate; and `findings`, a line each. InputError: the point is unknown, nothing
+    bends, or the motors do not hold the mechanism.
     """
     names = [f"{ref}.{axis}" for axis in ("x", "y")]
     for name in names:
