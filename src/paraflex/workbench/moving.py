@@ -107,17 +107,12 @@ class Mover:
 
     q: Array
     freedoms: int
-    mechanism: Mechanism
-    loops: LoopClosure
-    system: System
 
     def __init__(self, mechanism: Mechanism, assembly: str | None = None) -> None:
-        self._take(mechanism)
+        self.mechanism: Mechanism = mechanism
+        self.loops: LoopClosure = _loops_of(mechanism)
+        self.system: System = self.loops.system
         self.to_assembly(assembly)
-
-    def _take(self, mechanism: Mechanism) -> None:
-        self.mechanism, self.loops = mechanism, _loops_of(mechanism)
-        self.system = self.loops.system
 
     def to_assembly(self, name: str | None = None) -> Array:
         """Move to an assembly of the mechanism, loops closed, and return the pose."""
