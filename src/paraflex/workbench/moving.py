@@ -88,8 +88,6 @@ class Mover:
 
     Attributes
     ----------
-    mechanism : Mechanism
-        Mechanism as described.
     loops : LoopClosure
         Closure of the rigid mechanism without prescribed motions.
     q : (n,) array

@@ -22,6 +22,7 @@ from paraflex.mechanism import standing
 from paraflex.mechanism.masses import check_masses, with_any_masses
 from paraflex.reports.film import animation, frames_of
 from paraflex.results import motion_dataset
+from .messages import finite
 
 # Largest number of frames, and of points whose motion is shown.
 _FRAMES, _POINTS = 181, 7
@@ -62,7 +63,7 @@ def turning(model: Model, *, assembly: str | None = None, **wishes: Any) -> dict
     shown = _points(data)
     return {
         "over": _over(data, found),
-        "time": _plain(data["time"].values),
+        "time": finite(data["time"].values),
         "film": _film(data),
         "curves": [*_points_curves(data, shown), *_bodies_curves(data), *_joint_curves(data, found),
                    *_transmission_curves(motion), *_effort_curves(data)],
@@ -110,21 +111,13 @@ def _wished(model: Model, assembly: str | None, wishes: dict[str, Any]) -> dict[
     return {**wishes, "held": {name: joint_value(system, name, pose) for name in held}}
 
 
-def _plain(values: Array) -> Any:
-    """Return numbers as nested lists, None for those that are not finite."""
-    values = np.asarray(values, dtype=float)
-    if values.ndim > 1:
-        return [_plain(row) for row in values]
-    return [value if np.isfinite(value) else None for value in values.tolist()]
-
-
 def _over(data: xr.Dataset, found: dict[str, Any]) -> dict[str, Any]:
     """Return the abscissa of all curves: the coordinate of the drive, or the time."""
     joint = found["over"]
     if not joint:
-        return {"joint": "", "unit": "s", "values": _plain(data["time"].values)}
+        return {"joint": "", "unit": "s", "values": finite(data["time"].values)}
     values = data["joint_coordinate"].sel(joint=joint).values
-    return {"joint": joint, "unit": found["joint_units"][joint], "values": _plain(values)}
+    return {"joint": joint, "unit": found["joint_units"][joint], "values": finite(values)}
 
 
 def _film(data: xr.Dataset) -> dict[str, Any] | None:
@@ -141,7 +134,7 @@ def _points(data: xr.Dataset) -> list[str]:
 
 
 def _curve(of: str, quantity: str, part: str, unit: str, values: Array) -> dict[str, Any]:
-    return {"of": of, "quantity": quantity, "part": part, "unit": unit, "values": _plain(values)}
+    return {"of": of, "quantity": quantity, "part": part, "unit": unit, "values": finite(values)}
 
 
 def _points_curves(data: xr.Dataset, points: list[str]) -> Iterator[dict[str, Any]]:
@@ -188,7 +181,7 @@ def _trail(data: xr.Dataset, found: dict[str, Any], name: str) -> dict[str, Any]
     """Return the path of a point, with cusps and crunodes."""
     own = found["trails"].get(name, {"cusps": [], "crunodes": []})
     path = data["point_position"].sel(point=name).transpose("time", "axis").values
-    return {"of": name, "path": _plain(path), "cusps": own["cusps"], "crunodes": own["crunodes"]}
+    return {"of": name, "path": finite(path), "cusps": own["cusps"], "crunodes": own["crunodes"]}
 
 
 def _table(table: Any) -> dict[str, Any]:
