@@ -44,6 +44,23 @@ def status(address: str, **headers: str) -> int:
         return error.code
 
 
+@pytest.mark.parametrize("mark", [b"", b"\xef\xbb\xbf"])
+def test_a_byte_order_mark_is_kept(tmp_path, mark):
+    file = tmp_path / "mine.toml"
+    file.write_bytes(mark + b'name = "one"\n')
+    document = Document(str(file), drafts=tmp_path)
+    assert document.text == 'name = "one"\n'
+    document.change('name = "two"\n')
+    document.save()
+    assert file.read_bytes() == mark + b'name = "two"\n'
+    # Another program writes the file without a mark, or with one.
+    file.write_bytes(b"\xef\xbb\xbf"[: 3 - len(mark)] + b'name = "three"\n')
+    assert document.take_up()
+    document.change('name = "four"\n')
+    document.save()
+    assert file.read_bytes() == b"\xef\xbb\xbf"[: 3 - len(mark)] + b'name = "four"\n'
+
+
 def test_the_page_loads_nothing_from_elsewhere(address):
     for part in ("", "workbench.js", "workbench.css"):
         with urllib.request.urlopen(address + part, timeout=60) as found:

@@ -9,16 +9,25 @@ import pytest
 
 import paraflex as pf
 from paraflex.errors import AssemblyError, InputError
-from paraflex.figures.kinematics import kinematics_of
+from paraflex.figures.kinematics import kinematics_of, kinematics_tiles
 from paraflex.files import load
 from paraflex.results import motion_dataset
 from paraflex.results.posed import posed
-from paraflex.workbench.moving import Mover, assemblies
+from paraflex.workbench.assembling import assemblies
+from paraflex.workbench.computing import model_of
+from paraflex.workbench.document import Document
+from paraflex.workbench.moving import Mover
+from paraflex.workbench.session import EditSession
 from paraflex.workbench.turning import turning
 
 
 def mover_of(name):
     return Mover(pf.load(name).mechanism)
+
+
+def without_motors(mover):
+    """Return a mover of the same mechanism whose end-effector is held instead of its motors."""
+    return Mover(replace(mover.mechanism, motors=(), modes=()))
 
 
 def link(name, length, *more):
@@ -119,7 +128,7 @@ def test_a_five_bar_stops_at_its_boundary():
 
 def test_a_five_bar_stays_in_its_assembly_by_any_body():
     mover = mover_of("five_bar")
-    for pose in assemblies(mover, hold="end-effector"):
+    for pose in assemblies(without_motors(mover)):
         mover.at(pose)
         start, signs, random = mover.q.copy(), np.sign(sines(mover)), np.random.default_rng(5)
         home = place(mover, "distal1.C")
@@ -239,7 +248,7 @@ def test_a_changed_length_keeps_the_pose():
 
 def test_all_assemblies_of_a_five_bar():
     mover = mover_of("five_bar")
-    at_point, at_drives = assemblies(mover, hold="end-effector"), assemblies(mover)
+    at_point, at_drives = assemblies(without_motors(mover)), assemblies(mover)
     assert (len(at_point), len(at_drives)) == (4, 2)
     places = []
     for q in at_point:
@@ -262,25 +271,75 @@ def test_wrong_drags_are_refused_in_one_line():
             mover.drag(*arguments)
 
 
-@pytest.mark.parametrize("name", ["four_bar", "slider_crank_flexible", "five_bar"])
-def test_a_turn_has_the_numbers_of_kinematics(name):
-    model = pf.load(name)
-    found, expected = turning(model), kinematics_of(motion_dataset(pf.kinematics(model)))
+QUICK_RETURN = """
+name = "quick return"
+[ground]
+O = [0, 0]
+Q = [0, "-150 mm"]
+[body.crank]
+points = { O = [0, 0], A = ["100 mm", 0] }
+[body.arm]
+points = { Q = [0, 0], P = ["450 mm", 0] }
+[body.block]
+points = { A = [0, 0] }
+[joint]
+O = ["ground.O", "crank.O"]
+A = ["crank.A", "block.A"]
+Q = ["ground.Q", "arm.Q"]
+S = { points = ["arm.Q", "block.A"], type = "prismatic" }
+[prescribed.drive]
+joint = "O"
+speed = 2.0
+[assembly.one]
+crank = 0.3
+arm = "60 deg"
+block = "60 deg"
+"""
+
+
+@pytest.mark.parametrize(
+    ("name", "drive", "arguments"),
+    [
+        ("four_bar", "O", {}),
+        ("slider_crank", "O", {}),
+        ("spin_up", None, {}),
+        ("five_bar", None, {}),
+        ("five_bar", "A1", {"drive": "A1"}),
+        ("quick_return", "O", {}),
+    ],
+)
+def test_a_turn_has_the_numbers_of_kinematics(name, drive, arguments):
+    model = model_of(QUICK_RETURN) if name == "quick_return" else pf.load(name)
+    found, held = turning(model, **arguments), {}
+    if name == "five_bar" and drive:
+        # The other motor stays at its angle in the assembly.
+        held = {"A2": Mover(model.mechanism, model.study.assembly).angles()["proximal2"]}
+    if name == "spin_up":
+        drive = model.mechanism.prescribed[0].joint
+    data = motion_dataset(pf.kinematics(model, drive, **({"held": held} if held else {})))
+    expected = kinematics_of(data)
     json.dumps(found, allow_nan=False)
-    assert found["features"]["transmission_angles"] == expected["transmission_angles"]
-    assert found["features"]["dead_points"] == expected["dead_points"]
-    assert found["features"]["trails"] == expected["trails"]
-    assert len(found["frames"]["samples"]) == 181
-    k = found["frames"]["samples"][40]
+    assert found["over"]["joint"] == (drive or "")
+    if drive:
+        turned = data["joint_coordinate"].sel(joint=drive).values
+        assert found["over"]["values"] == pytest.approx(turned, abs=1e-9)
+        assert not expected["drive"]["full_turn"] or abs(turned[-1] - turned[0]) == pytest.approx(2.0 * np.pi)
+    assert found["time"] == pytest.approx(data["time"].values, abs=1e-9)
+    assert [one["of"] for one in found["trails"]]
     curve = {(one["of"], one["quantity"], one["part"]): one["values"] for one in found["curves"]}
-    assert len(found["over"]["values"]) == len(found["time"])
     for one in found["trails"]:
-        assert one["path"][k] == [curve[one["of"], "position", "x"][k], curve[one["of"], "position", "y"][k]]
+        place = data["point_position"].sel(point=one["of"]).transpose("time", "axis").values
+        assert np.array(one["path"]) == pytest.approx(place, abs=1e-9)
+        assert curve[one["of"], "position", "y"] == [y for _, y in one["path"]]
     for one in expected["transmission_angles"]:
         values = curve[one["joint"], "transmission angle", one["coupler"]]
         assert math.isclose(min(values), one["smallest"]["value"], abs_tol=1e-3)
         assert min(values) >= one["smallest"]["value"] - 1e-9
-    assert any(one["quantity"] == "torque" for one in found["curves"]) == (not found["loads_problem"])
+    assert found["tiles"] == [list(tile) for tile in kinematics_tiles(data)]
+    assert found["film"] is not None
+    # At constant speed without weight a balanced rotor needs no torque.
+    efforts = any(one["quantity"] in ("torque", "force") for one in found["curves"])
+    assert efforts == (not found["loads_problem"]) or name == "spin_up"
 
 
 def test_a_turn_without_masses_has_no_torques():
@@ -288,14 +347,15 @@ def test_a_turn_without_masses_has_no_torques():
     with pytest.raises(InputError, match="drive: is missing"):
         turning(sketch)
     found = turning(sketch, drive="O")
-    assert found["drive"]["full_turn"]
+    assert abs(found["over"]["values"][-1] - found["over"]["values"][0]) == pytest.approx(2.0 * np.pi)
     assert "mass" in found["loads_problem"]
     assert not any(one["quantity"] == "torque" for one in found["curves"])
     # Transmission angle by the law of cosines, of the distances between the pins of crank and rocker.
-    (one,) = found["features"]["transmission_angles"]
+    (values,) = [one["values"] for one in found["curves"] if one["quantity"] == "transmission angle"]
     angles = [math.acos((9.0 + 6.25 - d * d) / 15.0) for d in (2.5, 4.5)]
     least = min(min(angle, np.pi - angle) for angle in angles)
-    assert math.isclose(one["smallest"]["value"], least, rel_tol=1e-7)
+    assert min(values) == pytest.approx(least, abs=1e-3)
+    assert min(values) >= least - 1e-9
 
 
 @pytest.mark.parametrize("name", ["four_bar", "slider_crank_flexible", "spin_up", "five_bar"])
@@ -303,3 +363,46 @@ def test_the_pose_is_that_in_which_a_run_begins(name):
     model = load(name)
     begun = posed(model.mechanism, model.study.assembly)
     assert Mover(model.mechanism, model.study.assembly).angles() == pytest.approx(begun.angles, abs=1e-9)
+
+
+SLIDER_DRIVEN = """
+name = "slider driven"
+[ground]
+O = [0, 0]
+R = ["-100 mm", 0]
+[body.crank]
+points = { O = [0, 0], A = ["100 mm", 0] }
+[body.rod]
+points = { A = [0, 0], B = ["300 mm", 0] }
+[body.block]
+points = { B = [0, 0] }
+[joint]
+O = ["ground.O", "crank.O"]
+A = ["crank.A", "rod.A"]
+B = ["rod.B", "block.B"]
+S = { type = "prismatic", points = ["ground.R", "block.B"] }
+[prescribed.push]
+joint = "S"
+displacement = "450 mm"
+speed = -0.1
+[assembly.drawn]
+crank = 0.8
+rod = -0.3
+block = 0
+"""
+
+
+def test_a_slider_that_drives_begins_where_the_pose_is_kept(tmp_path):
+    session = EditSession(Document(text=SLIDER_DRIVEN, drafts=tmp_path), lambda _: None)
+    mover = session.bench.mover
+    assert mover.places()["block.B"] == pytest.approx([0.35, 0.0], abs=1e-9)
+    session.bench.drag("crank", "A", [0.0, 0.1])
+    kept = mover.places()
+    assert "ok" in session.answer({"id": 1, "do": "pose"})
+    assert 'displacement = "' in session.document.text
+    again = EditSession(Document(text=session.document.text, drafts=tmp_path), lambda _: None).bench.mover
+    for name, place in again.places().items():
+        assert place == pytest.approx(kept[name], abs=1e-6)
+    assert kept["block.B"][0] == pytest.approx(math.sqrt(0.3**2 - 0.1**2), abs=1e-6)
+    assert "ok" in session.answer({"id": 2, "do": "undo"})
+    assert session.document.text == SLIDER_DRIVEN

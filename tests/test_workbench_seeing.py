@@ -125,6 +125,45 @@ def torques(text, **more):
     return Seeing(model).quick(q, more.get("mode", ""))["torques"]
 
 
+class TestReasons:
+    """Why a number is not known, or what it leaves out."""
+
+    @pytest.mark.parametrize(
+        ("text", "reason"),
+        [
+            (ARM.partition("[end_effector]")[0] + "[assembly.drawn]\nupper = 0.4\n", "no end-effector"),
+            (ARM, "the task has 2 coordinates, the mechanism 1 degree of freedom"),
+            (ARM.replace('[motor]\nshoulder = "A"', "").replace('"x", "y"', '"x"'), "no motors"),
+            (
+                (ARM + FOREARM).replace('[motor.elbow]\njoint = "B"', "").replace('"upper.B"\nco', '"lower.C"\nco'),
+                "the motors drive 1 of 2 degrees of freedom",
+            ),
+            (
+                (ARM + FOREARM).replace('"upper.B"\nco', '"lower.C"\nco').replace("lower = 1.1", "lower = 0.4"),
+                "the end-effector is in a singular position (serial, type I)",
+            ),
+        ],
+    )
+    def test_no_condition(self, text, reason):
+        model, q = read(text)
+        found = Seeing(model).quick(q, "")
+        assert (found["condition"], found["why"]["condition"]) == (None, reason)
+
+    def test_no_reason_for_a_condition(self):
+        model, q = read((ARM + FOREARM).replace('"upper.B"\nco', '"lower.C"\nco'))
+        found = Seeing(model).quick(q, "")
+        assert found["condition"] > 1.0
+        assert "condition" not in found["why"]
+
+    def test_loads_that_vary_in_time_are_named(self):
+        text = CANTILEVER + '\n[load.gust]\ntype = "force"\nbody = "beam"\npoint = "T"\nforce = [0.0, "sin(3*t)"]\n'
+        model, q = read(text.replace('body = "beam"\npoint = "T"', 'point = "beam.T"'))
+        why = Seeing(model).full(q, "")["why"]
+        assert why["loads"] == "frequencies and compliance leave out loads that vary in time: gust"
+        model, q = read(CANTILEVER)
+        assert "loads" not in Seeing(model).full(q, "")["why"]
+
+
 class TestHoldingTorques:
     """Torques that hold gravity, loads and springs, by closed forms; positive on the second body of the joint."""
 
@@ -314,7 +353,11 @@ class TestForces:
         assert base[-1] == pytest.approx([LENGTH, 0.0], abs=1e-8)
         pressed = drag_force(model, q, "beam.T", [-10.0, 0.0])
         assert pressed["buckling"] == pytest.approx(np.pi**2 * EI / (4.0 * LENGTH**2) / 10.0, rel=1e-2)
-        assert drag_force(model, q, "beam.T", [10.0, 0.0])["buckling"] is None
+        # A straight beam loses stiffness in proportion to the force: both linear estimates are the same.
+        assert pressed["buckling_note"].startswith("linear estimate, which changes along the branch: ")
+        assert float(pressed["buckling_note"].split()[-7]) == pytest.approx(pressed["buckling"], rel=1e-2)
+        free = drag_force(model, q, "beam.T", [10.0, 0.0])
+        assert (free["buckling"], free["buckling_note"]) == (None, "")
 
     def test_as_of_statics(self):
         model, q = read(library_text("five_bar"))
@@ -341,9 +384,11 @@ class TestForces:
         model, q = read(library_text("five_bar"))
         found = drag_force(model, q, "distal1.C", [0.0, -40.0])
         assert found["findings"][0] == f"it snaps through at {found['buckling']:.3g} of the force"
+        assert found["buckling_note"] == "limit point"
         # A force of 5/8 of the limit finds the same one beyond it.
-        beyond = drag_force(model, q, "distal1.C", [0.0, -6.25])["buckling"]
-        assert 6.25 * beyond == pytest.approx(40.0 * found["buckling"], rel=1e-5)
+        beyond = drag_force(model, q, "distal1.C", [0.0, -6.25])
+        assert beyond["buckling_note"] == "limit point beyond this force"
+        assert 6.25 * beyond["buckling"] == pytest.approx(40.0 * found["buckling"], rel=1e-5)
 
     @pytest.mark.parametrize(("text", "ref", "problem"), [
         (CANTILEVER, "beam.nowhere", "neither a joint nor"),
@@ -391,6 +436,14 @@ class TestLinear:
         model, q = read(library_text("four_bar"))
         found = linear(model, q, "")
         assert found["held"][0] == pytest.approx(Seeing(model).full(q, "")["held"][0], rel=1e-6)
+
+    @pytest.mark.parametrize(("name", "mode"), [("five_bar", ""), ("3prr", ""), ("raparm_i", "")])
+    def test_held_are_all_motors_whatever_the_mode(self, name, mode):
+        model, q = read(library_text(name))
+        held = Seeing(model).full(q, mode)["held"]
+        for one in ["", *(each.name for each in model.mechanism.modes)]:
+            found = linear(model, q, one)["held"]
+            assert found[: len(held)] == pytest.approx(held, rel=1e-6)
 
     def test_nothing_excites_a_pendulum(self):
         with pytest.raises(InputError, match="nothing excites it"):

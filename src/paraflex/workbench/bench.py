@@ -15,9 +15,10 @@ from paraflex.mechanism.quantities import known
 from paraflex.plots.scene import Limits
 from paraflex.plots.svg import sketch
 from paraflex.results.posed import Posed, posed, posed_at
+from .assembling import assemblies
 from .document import Document
 from .messages import Message, described
-from .moving import Mover, assemblies
+from .moving import Mover
 from .picture import ground_picture, picture
 from .readiness import readiness
 from .seeing import Seeing

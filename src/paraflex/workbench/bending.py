@@ -18,7 +18,7 @@ from paraflex.linear import LinearModel, linearise
 from paraflex.mechanism import ConstantSpeed, Mechanism, RigidBody
 from paraflex.plots.scene import is_plate, scene
 from paraflex.results.findings import finding_lines
-from paraflex.results.linear_data import end_effector_outputs, motors_of
+from paraflex.results.linear_data import end_effector_outputs
 from paraflex.results.posed import posed_at
 from .seeing import Seeing
 
@@ -39,8 +39,9 @@ def drag_force(model: Model, q: Array, ref: str, force: Sequence[float], *, buck
     dict has `bodies` as in a picture, deflected, and `base`, the lines of the undeformed bodies, point by point;
     `place` of the deflected point [m], and its `deflection` by the force; `stiffness`, the force over the deflection
     along it [N/m], None without a force or if nothing yields; `buckling`, the factor of the force at which the
-    mechanism buckles, None if it does not or is not asked for, as limit points beyond the force are searched; and
-    `findings`, a line each. InputError: the point is unknown, nothing bends, or the motors do not hold the mechanism.
+    mechanism buckles, None if it does not or is not asked for, as limit points beyond the force are searched;
+    `buckling_note`, how far it is an estimate; and `findings`, a line each. InputError: the point is unknown, nothing
+    bends, or the motors do not hold the mechanism.
     """
     names = [f"{ref}.{axis}" for axis in ("x", "y")]
     for name in names:
@@ -52,6 +53,7 @@ def drag_force(model: Model, q: Array, ref: str, force: Sequence[float], *, buck
         mechanism, loads=loads if any(loads.values()) else {}, torques={}, moved={}, held=held, steps=1,
         stiffness=names, buckling=int(buckling), start=start, warning=False,
     )  # fmt: skip
+    factor = _factor(found) if buckling and any(loads.values()) else None
     places = np.column_stack([found.place(name) for name in names])
     deflection = places[-1] - places[0]
     return {
@@ -59,7 +61,8 @@ def drag_force(model: Model, q: Array, ref: str, force: Sequence[float], *, buck
         "place": places[-1].tolist(),
         "deflection": deflection.tolist(),
         "stiffness": _stiffness(np.array(list(loads.values())), deflection) if loads else None,
-        "buckling": _factor(found) if buckling and any(loads.values()) else None,
+        "buckling": factor,
+        "buckling_note": "" if factor is None else _accuracy(found),
         "findings": _findings(found),
     }
 
@@ -106,6 +109,18 @@ def _factor(found: Statics) -> float | None:
     return factor if np.isfinite(factor) else None
 
 
+def _accuracy(found: Statics) -> str:
+    """Return how far the buckling factor is an estimate, from the change along the branch as `paraflex statics`."""
+    if np.any(found.limit):
+        return "limit point"
+    first, last = (float(np.min(found.buckling[k], initial=np.inf)) for k in (0, -1))
+    if not np.isfinite(first):
+        return "linear estimate, of unknown error: none as seen without the force"
+    if first == last:
+        return "limit point beyond this force"
+    return f"linear estimate, which changes along the branch: {first:.3g} times as seen without the force"
+
+
 def _findings(found: Statics) -> list[str]:
     """Return a line for each finding, and for a force beyond a limit point."""
     beyond = found.fraction[found.limit]
@@ -119,7 +134,8 @@ def linear(model: Model, q: Array, mode: str) -> dict[str, Any]:
     """Return the linear model at rest in a rigid pose q (n,) with the motors of a mode; empty for all motors.
 
     The dict has `poles`, the slowest as [real part [1/s], imaginary part [rad/s], frequency [Hz], damping ratio],
-    without the lower halves of pairs; `held`, the lowest natural frequencies with these motors held [Hz]; `unbalanced`,
+    without the lower halves of pairs; `held`, the lowest natural frequencies with all motors held, also those of other
+    modes, and prescribed motions at rest, as in `Seeing.full` [Hz], empty if nothing is driven; `unbalanced`,
     the acceleration with which the mechanism would start [m/s^2]; `input`, the name of the first motor or prescribed
     motion, else of a force at the end-effector; `frequency` [Hz]; and `responses` of the end-effector, else of the
     motor's joint or the sensors, as far as they respond: `output`, `unit`, `magnitude` [dB] and `phase` [degrees].
@@ -132,11 +148,12 @@ def linear(model: Model, q: Array, mode: str) -> dict[str, Any]:
         raise InputError("nothing excites it: no motor, drive or end-effector", field="motor", remedy=remedy)
     forced = [] if driven or effector is None else [str(effector.point)]
     found = linearise(mechanism, mode=mode or None, start=_undeformed(mechanism, q), forces=forced)
-    poles, held = found.poles(), found.held_frequencies(motors_of(found)) / (2.0 * np.pi)
+    every = [motor.name for motor in mechanism.motors]
+    poles, held = found.poles(), found.held_frequencies(every) / (2.0 * np.pi)
     frequency = _frequencies(np.concatenate([np.abs(poles) / (2.0 * np.pi), held]))
     return {
         "poles": [_pole(pole) for pole in poles if pole.imag >= 0.0][:_POLES],
-        "held": held[held > 0.0][:_FIRST].tolist(),
+        "held": held[held > 0.0][:_FIRST].tolist() if driven else [],
         "unbalanced": float(found.unbalanced),
         "input": found.inputs[0].name,
         "frequency": frequency.tolist(),

@@ -160,7 +160,7 @@ def pose(sheet: Sheet, action: Action) -> Done:
         for body, angle in angles.items()
         if body in known
     }
-    return with_starts(sheet, turns), f"assembly.{name}"
+    return with_starts(sheet, turns, action.get("travels") or {}), f"assembly.{name}"
 
 
 def copied(sheet: Sheet, action: Action) -> Done:

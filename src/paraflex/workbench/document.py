@@ -1,5 +1,6 @@
 """The text of a model file while it is edited: its history, the file on the disk, and a draft that survives a crash."""
 
+import codecs
 import hashlib
 import os
 from contextlib import suppress
@@ -39,7 +40,7 @@ class Document:
         self.name: str = "untitled" if source is None or "#model=" in source else source
         self.folder: Path = Path() if self.file is None else self.file.parent
         self._steps, self._now, self._on_disk = [text], 0, text if self.file is not None else None
-        self._stamp = self._stamped()
+        self._stamp, self._mark = self._stamped(), self._marked()
         folder = _drafts() if drafts is None else drafts
         self._draft = folder / f"{hashlib.sha256(str(self._identity()).encode()).hexdigest()[:20]}.toml"
         # Sheets without a name have no drafts: two of them would share one.
@@ -103,7 +104,7 @@ class Document:
         file = self.file if name is None else self._named(name)
         if file is None:
             raise InputError("the model has no file yet", field="file", remedy="give a name, such as mine.toml")
-        write_text(file, self.text, remedy="choose another name")
+        write_text(file, self._mark + self.text, remedy="choose another name")
         self.file, self.folder, self.name = file, file.parent, str(file)
         self._on_disk, self._stamp = self.text, self._stamped()
         with suppress(OSError):
@@ -119,7 +120,7 @@ class Document:
             text = read_text(self.file)
         except InputError:
             return False
-        self._stamp = stamp
+        self._stamp, self._mark = stamp, self._marked()
         if text == self._on_disk:
             return False
         self._on_disk = text
@@ -146,6 +147,14 @@ class Document:
             if self.file is not None:
                 state = self.file.stat()
                 return f"{state.st_mtime_ns} {state.st_size} {state.st_ino}"
+        return ""
+
+    def _marked(self) -> str:
+        """Return the byte order mark with which the file begins, which is no part of its text; empty without one."""
+        with suppress(OSError, ValueError):
+            if self.file is not None:
+                with self.file.open("rb") as stream:
+                    return codecs.BOM_UTF8.decode() if stream.read(3) == codecs.BOM_UTF8 else ""
         return ""
 
     def _keep(self) -> None:

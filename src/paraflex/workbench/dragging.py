@@ -11,8 +11,10 @@ from paraflex.arrays import Array
 from paraflex.dynamics import System
 from paraflex.kernel.constraints import constraint_values
 from paraflex.kernel.packed import Scratch, Signals, make_scratch
-from .branches import Guard
+from .branches import MARGIN, Guard
 
+# Longest step of the target [sizes of the mechanism], their largest number, and iterations for a step and at the end.
+_STEP, _MOST_STEPS, _ON_THE_WAY, _AT_THE_END = 0.1, 24, 4, 60
 # Longest and shortest step, and step of the finite differences for second derivatives [sizes of the mechanism, rad].
 _LONGEST, _SHORTEST, _DIFFERENCE = 0.2, 1e-11, 1e-6
 # A target nearer than this is reached [sizes of the mechanism].
@@ -80,6 +82,17 @@ class Dragging:
     def distance(self, q: Array, target: Array) -> float:
         """Return the distance of the point from a target [sizes of the mechanism]."""
         return float(np.hypot(*(self.place(q) - target))) / self.system.size
+
+    def directions(self, q: Array, free: Array) -> int:
+        """Return in how many directions free motions (n, k) move the point."""
+        return int(np.sum(np.linalg.svd(self.rows(q) @ free, compute_uv=False) > 10.0 * MARGIN))
+
+    def follow(self, q: Array, start: Array, goal: Array) -> Array:
+        """Return the pose that follows a target along a line, in short steps."""
+        steps = int(min(np.ceil(np.hypot(*(goal - start)) / (_STEP * self.system.size)), _MOST_STEPS))
+        for part in np.arange(1, steps) / max(steps, 1):
+            q = self.approach(q, start + part * (goal - start), _ON_THE_WAY)
+        return self.approach(q, goal, _AT_THE_END)
 
     def approach(self, q: Array, target: Array, iterations: int) -> Array:
         """Return the pose nearest to a target that continuous motion from q leads to, or one on the way there."""

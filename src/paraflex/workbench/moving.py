@@ -8,26 +8,22 @@ from typing import NamedTuple
 import numpy as np
 
 from paraflex.arrays import Array
-from paraflex.driven.assemblies import poses_of
 from paraflex.driven.exact import NO_TASKS
-from paraflex.driven.ranges import JointDrive
-from paraflex.dynamics import System, closure_of, material_angle, reference_pose, standing_system
-from paraflex.dynamics.joint_coordinates import joint_rows, joint_value
+from paraflex.dynamics import System, closure_of, reference_pose, standing_system
+from paraflex.dynamics.joint_coordinates import joint_value
 from paraflex.dynamics.points import marker_position
 from paraflex.dynamics.projection import assemble, closed, constraint_change
 from paraflex.dynamics.soundness import mobility
 from paraflex.dynamics.state import State
 from paraflex.errors import InputError, listed
-from paraflex.mechanism import GROUND, Assembly, ConstantSpeed, Joint, Mechanism, PointRef, RevoluteJoint, WeldJoint
+from paraflex.mechanism import GROUND, Assembly, Joint, Mechanism, PointRef
 from paraflex.mechanism.masses import with_any_masses
 from paraflex.mechanism.poses import local_points
 from paraflex.mechanism.quantities import known
 from paraflex.paths.loops import LoopClosure
-from .branches import MARGIN, NO_SIGN, Branches, Guard
+from .branches import NO_SIGN, Branches, Guard
 from .dragging import REACHED, Dragging
 
-# Longest step of the target [sizes of the mechanism], their largest number, and iterations for a step and at the end.
-_STEP, _MOST_STEPS, _ON_THE_WAY, _AT_THE_END = 0.1, 24, 4, 60
 # Longest step of closures after a change [sizes of the mechanism, rad].
 _LONGEST = 0.2
 # Targets further away are brought nearer [sizes of the mechanism].
@@ -37,8 +33,6 @@ _APART, _REMEMBERED = 0.02, 500
 # Elbows with a smaller sine are named where a drag stops, slopes of the distance below this belong to limits of reach,
 # and so many elbows are named.
 _NAMED, _LEVEL, _LISTED = 1e-2, 1e-2, 3
-# Joints at which freedoms are held have independent coordinates, to this singular value.
-_INDEPENDENT = 1e-6
 _PARALLEL = "the drives {} cannot hold it: parallel singular position (type II)"
 
 
@@ -94,8 +88,6 @@ class Mover:
 
     Attributes
     ----------
-    mechanism : Mechanism
-        Mechanism as described.
     loops : LoopClosure
         Closure of the rigid mechanism without prescribed motions.
     q : (n,) array
@@ -113,17 +105,12 @@ class Mover:
 
     q: Array
     freedoms: int
-    mechanism: Mechanism
-    loops: LoopClosure
-    system: System
 
     def __init__(self, mechanism: Mechanism, assembly: str | None = None) -> None:
-        self._take(mechanism)
+        self.mechanism: Mechanism = mechanism
+        self.loops: LoopClosure = _loops_of(mechanism)
+        self.system: System = self.loops.system
         self.to_assembly(assembly)
-
-    def _take(self, mechanism: Mechanism) -> None:
-        self.mechanism, self.loops = mechanism, _loops_of(mechanism)
-        self.system = self.loops.system
 
     def to_assembly(self, name: str | None = None) -> Array:
         """Move to an assembly of the mechanism, loops closed, and return the pose."""
@@ -179,6 +166,11 @@ class Mover:
         found = {str(ref): marker_position(self.system, self.system.marker(ref), self.q) for ref in refs}
         return {name: (float(x), float(y)) for name, (x, y) in found.items()}
 
+    def travels(self) -> dict[str, float]:
+        """Return the travels of all sliding joints with prescribed motions at the present pose [m]."""
+        sliding = [one.joint for one in self.mechanism.prescribed if self.mechanism.slides(one.joint)]
+        return {name: joint_value(self.system, name, self.q) for name in sliding}
+
     def release(self) -> None:
         """End the present drag; the next one begins from the present pose."""
         self._drag = None
@@ -203,7 +195,7 @@ class Mover:
         place = drag.place(self.q)
         away = float(np.hypot(*(target - place))) / size
         goal = place + (target - place) * min(1.0, _FAR / max(away, _FAR))
-        q = self._followed(here, self.q, here.target, goal)
+        q = drag.follow(self.q, here.target, goal)
         if here.determined and drag.distance(q, goal) > REACHED:
             q = self._from_passed(here, q, goal)
         reached = drag.distance(q, target) <= REACHED
@@ -213,19 +205,12 @@ class Mover:
         self.q, here.target = q, goal
         return Moved(q, reached, *(("", "") if reached else self._stop(here, q, goal)))
 
-    def _followed(self, here: _Drag, q: Array, start: Array, goal: Array) -> Array:
-        """Return the pose that follows a target along a line, in short steps."""
-        steps = int(min(np.ceil(np.hypot(*(goal - start)) / (_STEP * self.system.size)), _MOST_STEPS))
-        for part in np.arange(1, steps) / max(steps, 1):
-            q = here.dragging.approach(q, start + part * (goal - start), _ON_THE_WAY)
-        return here.dragging.approach(q, goal, _AT_THE_END)
-
     def _from_passed(self, here: _Drag, q: Array, goal: Array) -> Array:
         """Return the pose that follows from the nearest pose passed in this drag, if it comes nearer to the target."""
         place, pose = min(here.passed, key=lambda one: float(np.hypot(*(one[0] - goal))))
         if np.hypot(*(place - goal)) >= self.system.size * here.dragging.distance(q, goal):
             return q
-        again = self._followed(here, pose, place, goal)
+        again = here.dragging.follow(pose, place, goal)
         return again if here.dragging.distance(again, goal) < here.dragging.distance(q, goal) - REACHED else q
 
     def _dragged(self, body: str, local: Iterable[float] | str) -> _Drag:
@@ -292,7 +277,8 @@ class Mover:
         near = [guard for guard in drag.guards if guard.sign and guard.room(q) < guard.margin]
         slope = drag.slope(q, goal)
         falling = float(np.linalg.norm(slope.gradient)) > _LEVEL * drag.distance(q, goal)
-        lost = self._rank(drag, q, slope.free) < self._rank(drag, *self._usual)
+        usual = self._branches.start, self._branches.free(self._branches.start)
+        lost = drag.directions(q, slope.free) < drag.directions(*usual)
         if not near and not lost:
             return "", ""
         elbows = self._branches.elbows_to(here.body, drag.local)
@@ -302,16 +288,6 @@ class Mover:
         own = "singular position" if stop == "singular" else f"limit of reach of {here.body}"
         return stop, f"{own}: {listed([*texts], _LISTED)}" if texts else own
 
-    @property
-    def _usual(self) -> tuple[Array, Array]:
-        """Start pose of the assembly, and its free motions."""
-        return self._branches.start, self._branches.free(self._branches.start)
-
-    @staticmethod
-    def _rank(drag: Dragging, q: Array, free: Array) -> int:
-        """Return in how many directions the dragged point can move."""
-        return int(np.sum(np.linalg.svd(drag.rows(q) @ free, compute_uv=False) > 10.0 * MARGIN))
-
 
 def _begun(mechanism: Mechanism, loops: LoopClosure, assembly: Assembly) -> Array:
     """Return the pose in which a run begins: with prescribed motions as they begin, if the loops close with them."""
@@ -320,64 +296,3 @@ def _begun(mechanism: Mechanism, loops: LoopClosure, assembly: Assembly) -> Arra
         if found.state is not None:
             return found.state.q
     return loops.assembled(assembly)
-
-
-def assemblies(mover: Mover, starts: int = 200, *, hold: str = "") -> list[Array]:
-    """Search for all assemblies at the present position of the drives or of the end-effector.
-
-    Parameters
-    ----------
-    mover : Mover
-        Mover at its present pose.
-    starts : int
-        Number of random starts, as in `driven.assemblies`.
-    hold : str
-        "drives", "end-effector", or empty for the drives if there are as many as degrees of freedom, else the
-        end-effector, else as many joints as needed, those at the ground first.
-
-    Returns
-    -------
-    list of (n,) array
-        Poses, the present one first.
-    """
-    known(hold, ["", "drives", "end-effector"], "hold", "choice")
-    loops = LoopClosure(_held(mover, hold), 0.0, None, NO_TASKS)
-    return [pose for pose, _ in poses_of(loops, mover.q, starts)]
-
-
-def _held(mover: Mover, hold: str) -> Mechanism:
-    """Return the rigid mechanism with its drives, end-effector or other joints held at the present pose."""
-    rigid, effector = mover.loops.mechanism, mover.mechanism.end_effector
-    at_effector = effector is not None and mover.freedoms in (2, 3)
-    if (hold == "drives" and not mover.drives) or (hold == "end-effector" and not at_effector):
-        remedy = "leave it out, and joints at the ground are held"
-        raise InputError("does not determine the pose", field="hold", value=hold, remedy=remedy)
-    if mover.drives and hold != "end-effector":
-        return _with_held(mover, mover.drives)
-    if effector is not None and at_effector:
-        place = marker_position(mover.system, mover.system.marker(effector.point), mover.q)
-        pin = PointRef(GROUND, "held_point")
-        ground = {**rigid.ground, pin.point: (float(place[0]), float(place[1]))}
-        angle = float(material_angle(mover.system, effector.point, mover.q[None])[0])
-        more = (
-            RevoluteJoint("held_joint", pin, effector.point)
-            if mover.freedoms == 2
-            else WeldJoint("held_joint", pin, effector.point, angle)
-        )
-        return replace(rigid, ground=ground, joints=(*rigid.joints, more))
-    grounded = [one.name for one in rigid.joints if one.moves and GROUND in (one.a.body, one.b.body)]
-    return _with_held(mover, list(dict.fromkeys([*grounded, *(one.name for one in rigid.joints if one.moves)])))
-
-
-def _with_held(mover: Mover, names: list[str]) -> Mechanism:
-    """Return the rigid mechanism with as many of some joints held as it has freedoms."""
-    free, held = Branches(mover.system, mover.freedoms, mover.q).free(mover.q), list[str]()
-    for name in names:
-        rows = joint_rows(mover.system, [*held, name], mover.q) * mover.system.units
-        rows[[mover.mechanism.slides(one) for one in (*held, name)]] /= mover.system.size
-        if np.linalg.svd(rows @ free, compute_uv=False)[-1] > _INDEPENDENT and len(held) < mover.freedoms:
-            held.append(name)
-    at = {name: joint_value(mover.system, name, mover.q) for name in held}
-    drives = tuple(JointDrive(f"{name} held", name, ConstantSpeed(value, 0.0)) for name, value in at.items())
-    left = replace(mover.loops.mechanism, motors=(), modes=())
-    return replace(left, prescribed=drives)

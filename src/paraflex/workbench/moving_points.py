@@ -51,8 +51,11 @@ def move_point(sheet: Sheet, action: Action) -> Done:
     return sheet, f"ground.{ref.partition('.')[2]}" if ref.startswith(f"{GROUND}.") else f"body.{ref.partition('.')[0]}"
 
 
-def with_starts(sheet: Sheet, turns: Mapping[str, float]) -> Sheet:
-    """Let prescribed motions begin at the angles to which bodies have turned; laws of the time stay as they are."""
+def with_starts(sheet: Sheet, turns: Mapping[str, float], travels: Mapping[str, float] | None = None) -> Sheet:
+    """Let prescribed motions begin at the angles to which bodies have turned, and at the travels of sliding joints.
+
+    Laws of the time stay as they are.
+    """
     joints = {joint.name: joint for joint in sheet.joints}
     for name in sheet.names("prescribed"):
         place = ("prescribed", name, "angle")
@@ -61,6 +64,11 @@ def with_starts(sheet: Sheet, turns: Mapping[str, float]) -> Sheet:
             change = turns.get(joint.b.body, 0.0) - turns.get(joint.a.body, 0.0)
             with suppress(InputError):
                 sheet = with_number(sheet, place, sheet.number(place) + change)
+        place = ("prescribed", name, "displacement")
+        if joint is not None and value_at(sheet.data, place) is not None and joint.name in (travels or {}):
+            with suppress(InputError):
+                if not isclose(sheet.number(place), float((travels or {})[joint.name]), abs_tol=_EQUAL):
+                    sheet = with_number(sheet, place, float((travels or {})[joint.name]))
     return sheet
 
 

@@ -16,7 +16,7 @@ from paraflex.dynamics.linearise import LOWEST, PoseMatrices, compliance, pose_m
 from paraflex.dynamics.points import marker_place
 from paraflex.dynamics.state import State
 from paraflex.dynamics.stiffness import RestingForces
-from paraflex.errors import InputError, NumericalError, ParaflexError
+from paraflex.errors import InputError, NumericalError, ParaflexError, listed
 from paraflex.files import Model
 from paraflex.mechanism import Mechanism
 from paraflex.mechanism.masses import check_masses, with_any_masses
@@ -90,8 +90,30 @@ class Seeing:
         by_motors, by_task = self._moved(q, motors, free)
         found = {"freedoms": free.shape[1], "mode": mode, "drives": int(_rank(by_motors))}
         found |= self._singular(q, motors) | {"condition": _condition(by_task, by_motors)}
+        if found["condition"] is None:
+            why["condition"] = self._no_condition(by_task, by_motors)
         found["torques"] = self._holding(q, free, by_motors, [*motors, *self._drives], why)
         return {**found, "why": why}
+
+    def _no_condition(self, by_task: Array | None, by_motors: Array) -> str:
+        """Return the reason why there is no condition number."""
+        freedoms = by_motors.shape[1]
+        if by_task is None:
+            return "no end-effector"
+        if not freedoms:
+            return "no degree of freedom"
+        if not by_motors.size:
+            return "no motors"
+        if len(by_task) != freedoms:
+            many = "1 degree" if freedoms == 1 else f"{freedoms} degrees"
+            task = "coordinate" if len(by_task) == 1 else "coordinates"
+            return f"the task has {len(by_task)} {task}, the mechanism {many} of freedom"
+        if np.linalg.matrix_rank(by_task) < freedoms:
+            return "the end-effector is in a singular position (serial, type I)"
+        driven = _rank(by_motors)
+        if len(by_motors) < freedoms:
+            return f"the motors drive {driven} of {freedoms} degrees of freedom"
+        return "the motors are in a singular position (parallel, type II)"
 
     def _moved(self, q: Array, motors: Sequence[str], free: Array) -> tuple[Array, Array | None]:
         """Return the velocities of motors and drives, and of the task, by the free motions."""
@@ -134,6 +156,8 @@ class Seeing:
             state = undeformed(self._flexible, self._rigid, State(0.0, q, np.zeros(self._rigid.n)))
             held = list(dict.fromkeys([*self._joint.values(), *self._drives]))
             at = pose_matrices(self._flexible, state, held)
+            if varying := [one.name for one in self._mechanism.loads if one.profiles]:
+                why["loads"] = f"frequencies and compliance leave out loads that vary in time: {listed(varying)}"
             found["held"] = self._frequencies(state, at, held) if held else None
             free = len(held) > len(self._drives) or not held
             found["unheld"] = self._frequencies(state, at, self._drives) if free else None

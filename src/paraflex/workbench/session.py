@@ -127,7 +127,10 @@ class EditSession:
     def _posed(self) -> str:
         """Return the text with the present pose as the assembly."""
         mover = self.bench.mover
-        action = {"kind": "pose", "assembly": self.bench.assembly, "angles": mover.angles(), "points": mover.places()}
+        action = {
+            "kind": "pose", "assembly": self.bench.assembly, "angles": mover.angles(), "points": mover.places(),
+            "travels": mover.travels(),
+        }  # fmt: skip
         return apply(self.document.text, action, self.document.folder).text
 
     def _do_goes(self, message: Message) -> Message:

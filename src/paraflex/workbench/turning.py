@@ -1,7 +1,7 @@
 """Full turn of a crank, or motion along a path, as plain data for the page: frames, curves, features."""
 
 from collections.abc import Iterator
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from typing import Any
 
 import numpy as np
@@ -10,26 +10,31 @@ import xarray as xr
 from paraflex.arrays import Array
 from paraflex.driven import DrivenMotion, kinematics, torques
 from paraflex.driven.features import transmission_angles
+from paraflex.driven.ranges import freedoms_at
+from paraflex.dynamics import build_system
+from paraflex.dynamics.joint_coordinates import joint_value
 from paraflex.errors import AssemblyError, InputError, ParaflexError, UnreachablePathError
 from paraflex.figures.kinematics import coupler_points, cycle_note, kinematics_of, kinematics_tables, kinematics_tiles
 from paraflex.figures.run_motion import moving_points
 from paraflex.figures.selection import names_of
-from paraflex.figures.shapes import figure_of
 from paraflex.files import Model
-from paraflex.mechanism.masses import check_masses
-from paraflex.plots.scene import is_plate
+from paraflex.mechanism import standing
+from paraflex.mechanism.masses import check_masses, with_any_masses
 from paraflex.reports.film import animation, frames_of
 from paraflex.results import motion_dataset
-from paraflex.results.drawing import system_drawing
-from paraflex.results.outlines import outlines
+from .messages import finite
 
-# Largest number of frames, of points whose motion is shown, and digits of positions behind the point [m].
-_FRAMES, _POINTS, _DIGITS = 181, 7, 7
+# Largest number of frames, and of points whose motion is shown.
+_FRAMES, _POINTS = 181, 7
 _RATES = {"position": "m", "velocity": "m/s", "acceleration": "m/s^2"}
 
 
 def turning(model: Model, *, assembly: str | None = None, **wishes: Any) -> dict[str, Any]:
     """Return the motion that `paraflex kinematics` computes, or `paraflex torques` if all bodies have masses.
+
+    By default the joint of the only prescribed motion or motor makes a full turn, or moves over its whole range, if it
+    drives the only degree of freedom. A drive that leaves degrees of freedom open has the other joints of prescribed
+    motions and motors held as they are in the assembly.
 
     Parameters
     ----------
@@ -43,10 +48,9 @@ def turning(model: Model, *, assembly: str | None = None, **wishes: Any) -> dict
     Returns
     -------
     dict
-        Numbers in SI units and radians, None where there is none: what drives the mechanism (`drive`, `path`, `mode`,
-        `freedoms`, `over`), `time`, `frames`, `film` as a report has it, `curves`, `trails`, and the features as
-        `paraflex kinematics` has them (`features`, `tiles`, `tables`, `note`), `findings`, and why there are no forces
-        (`loads_problem`).
+        Numbers in SI units and radians, None where there is none: the abscissa of all curves (`over`), `time`, `film`
+        as a report has it, `curves`, `trails`, the features as `paraflex kinematics` prints them (`tiles`, `tables`,
+        `note`), `findings`, and why there are no forces (`loads_problem`).
 
     Raises
     ------
@@ -58,18 +62,12 @@ def turning(model: Model, *, assembly: str | None = None, **wishes: Any) -> dict
     found = kinematics_of(data)
     shown = _points(data)
     return {
-        "drive": found["drive"],
-        "path": found["path"],
-        "mode": found["mode"],
-        "freedoms": found["degrees_of_freedom"],
         "over": _over(data, found),
-        "time": _plain(data["time"].values),
-        "frames": _frames(motion),
+        "time": finite(data["time"].values),
         "film": _film(data),
         "curves": [*_points_curves(data, shown), *_bodies_curves(data), *_joint_curves(data, found),
                    *_transmission_curves(motion), *_effort_curves(data)],
         "trails": [_trail(data, found, name) for name in shown],
-        "features": found,
         "tiles": [list(tile) for tile in kinematics_tiles(data)],
         "tables": [_table(table) for table in kinematics_tables(data) if table],
         "note": cycle_note(found),
@@ -81,12 +79,12 @@ def turning(model: Model, *, assembly: str | None = None, **wishes: Any) -> dict
 def _computed(model: Model, assembly: str | None, wishes: dict[str, Any]) -> tuple[DrivenMotion, str]:
     """Return the motion, with torques if they can be computed, and the reason if they cannot."""
     try:
-        check_masses(model.mechanism)
-        return torques(model, assembly=assembly, **wishes), ""
-    except ParaflexError as error:
-        reason = str(error)
-    try:
-        return kinematics(model, assembly=assembly, **wishes), reason
+        wishes = _wished(model, assembly, wishes)
+        try:
+            check_masses(model.mechanism)
+            return torques(model, assembly=assembly, **wishes), ""
+        except ParaflexError as error:
+            return kinematics(model, assembly=assembly, **wishes), str(error)
     except UnreachablePathError as error:
         path = wishes.get("path") or (not wishes.get("drive") and model.paths)
         field = f"path.{wishes.get('path') or model.path_name()}" if path else "drive"
@@ -96,47 +94,36 @@ def _computed(model: Model, assembly: str | None, wishes: dict[str, Any]) -> tup
         raise InputError(error.problem, field=field, remedy=error.remedy) from error
 
 
-def _plain(values: Array) -> Any:
-    """Return numbers as nested lists, None for those that are not finite."""
-    values = np.asarray(values, dtype=float)
-    if values.ndim > 1:
-        return [_plain(row) for row in values]
-    return [value if np.isfinite(value) else None for value in values.tolist()]
+def _wished(model: Model, assembly: str | None, wishes: dict[str, Any]) -> dict[str, Any]:
+    """Return the arguments of `driven.kinematics` with the drive that is turned, and the joints that are held."""
+    if any(wishes.get(name) is not None for name in ("path", "held", "duration")):
+        return wishes
+    mechanism = replace(with_any_masses(model.mechanism).rigid(), prescribed=())
+    freedoms, pose = freedoms_at(mechanism, standing(mechanism, assembly).assembly(assembly))
+    joints = dict.fromkeys(one.joint for one in model.mechanism.prescribed or model.mechanism.motors)
+    drive = wishes.get("drive")
+    if drive is None:
+        return {**wishes, "drive": next(iter(joints))} if len(joints) == freedoms == 1 else wishes
+    others = [one.joint for one in (*model.mechanism.prescribed, *model.mechanism.motors) if one.joint != drive]
+    held, system = dict.fromkeys(others), build_system(mechanism)
+    if len(held) != freedoms - 1 or not held:
+        return wishes
+    return {**wishes, "held": {name: joint_value(system, name, pose) for name in held}}
 
 
 def _over(data: xr.Dataset, found: dict[str, Any]) -> dict[str, Any]:
     """Return the abscissa of all curves: the coordinate of the drive, or the time."""
     joint = found["over"]
     if not joint:
-        return {"joint": "", "unit": "s", "values": _plain(data["time"].values)}
+        return {"joint": "", "unit": "s", "values": finite(data["time"].values)}
     values = data["joint_coordinate"].sel(joint=joint).values
-    return {"joint": joint, "unit": found["joint_units"][joint], "values": _plain(values)}
+    return {"joint": joint, "unit": found["joint_units"][joint], "values": finite(values)}
 
 
 def _film(data: xr.Dataset) -> dict[str, Any] | None:
     """Return the motion with the symbols of joints, as the page plays runs."""
     film = animation(data.isel(time=frames_of(data.sizes["time"], _FRAMES)).transpose("time", ...), ())
     return None if film is None else film.to_dict()
-
-
-def _frames(motion: DrivenMotion) -> dict[str, Any]:
-    """Return the lines of the bodies and places of the joints at some samples."""
-    q, described = motion.solution.q, motion.system.described
-    samples = np.unique(np.linspace(0, len(q) - 1, min(len(q), _FRAMES)).round().astype(int))
-    drawn, first, bodies = system_drawing(motion.system, q[samples]), 0, []
-    for one in outlines(described):
-        own = figure_of(drawn.shape[:, first : first + len(one.places)].round(_DIGITS))
-        # A rigid beam has two ends.
-        own = own[:, [0, -1]] if not np.any(one.places[:, 1] - one.places[0, 1]) else own
-        bodies.append([one.body, own.tolist(), bool(is_plate(own[0]))])
-        first += len(one.places)
-    angles = {body.name: q[samples, motion.system.body(body.name).angle].tolist() for body in described.bodies}
-    return {
-        "samples": samples.tolist(),
-        "bodies": bodies,
-        "joints": [[one.name, drawn.joints[:, k].round(_DIGITS).tolist()] for k, one in enumerate(described.joints)],
-        "angles": angles,
-    }
 
 
 def _points(data: xr.Dataset) -> list[str]:
@@ -147,7 +134,7 @@ def _points(data: xr.Dataset) -> list[str]:
 
 
 def _curve(of: str, quantity: str, part: str, unit: str, values: Array) -> dict[str, Any]:
-    return {"of": of, "quantity": quantity, "part": part, "unit": unit, "values": _plain(values)}
+    return {"of": of, "quantity": quantity, "part": part, "unit": unit, "values": finite(values)}
 
 
 def _points_curves(data: xr.Dataset, points: list[str]) -> Iterator[dict[str, Any]]:
@@ -194,7 +181,7 @@ def _trail(data: xr.Dataset, found: dict[str, Any], name: str) -> dict[str, Any]
     """Return the path of a point, with cusps and crunodes."""
     own = found["trails"].get(name, {"cusps": [], "crunodes": []})
     path = data["point_position"].sel(point=name).transpose("time", "axis").values
-    return {"of": name, "path": _plain(path), "cusps": own["cusps"], "crunodes": own["crunodes"]}
+    return {"of": name, "path": finite(path), "cusps": own["cusps"], "crunodes": own["crunodes"]}
 
 
 def _table(table: Any) -> dict[str, Any]:

@@ -87,7 +87,7 @@ export class Pulling {
     this.sheet.repaint();
     const [dx, dy] = found.deflection, size = Math.hypot(...this.force), lines = [
       `${this.ref} moves by ${quantity(dx, "m") || "0"}, ${quantity(dy, "m") || "0"}`, found.stiffness ? `stiffness along the force ${quantity(found.stiffness, "N/m")}` : "",
-      found.buckling ? `buckles at ${quantity(found.buckling * size, "N")}, ${shortNumber(found.buckling, 3)} times this force` : "", ...found.findings, this.shown > 1 ? `drawn × ${this.shown}` : "",
+      found.buckling ? `buckles at ${quantity(found.buckling * size, "N")}, ${shortNumber(found.buckling, 3)} times this force (${found.buckling_note})` : "", ...found.findings, this.shown > 1 ? `drawn × ${this.shown}` : "",
     ].filter(Boolean);
     this.text.replaceChildren(...lines.map((line) => element("div", { class: found.findings.includes(line) ? "wrong" : "" }, line)));
   }
@@ -139,7 +139,7 @@ export function linearCharts(bench, found) {
     charts.push({ ...base, identity: "phase", title: "Phase", x: "frequency [Hz]", y: ["phase [°]"], log_x: true, curves: curves("phase") });
   }
   const page = { rows, runs: [""], abscissae: [], time: -1 }, clock = { time: 0, index: 0, over: 0, seek() {} };
-  const note = [found.held.length ? `Frequencies with these motors held: ${found.held.map((one) => shortNumber(one, 3)).join(", ")} Hz.` : "", found.unbalanced > 1e-6 ? `The mechanism does not rest here: it would start with ${quantity(found.unbalanced, "m/s^2")}.` : ""].filter(Boolean).join(" ");
+  const note = [found.held.length ? `Frequencies with all motors held: ${found.held.map((one) => shortNumber(one, 3)).join(", ")} Hz.` : "", found.unbalanced > 1e-6 ? `The mechanism does not rest here: it would start with ${quantity(found.unbalanced, "m/s^2")}.` : ""].filter(Boolean).join(" ");
   const table = { title: "Poles", heads: [["real part", "1/s"], ["imaginary part", "rad/s"], ["frequency", "Hz"], ["damping ratio", ""]], rows: found.poles.slice(0, 12).map((pole) => pole.map((one) => shortNumber(one ?? NaN))), note };
   return { charts: charts.map((one) => new Chart(bench, clock, one, page)), table };
 }

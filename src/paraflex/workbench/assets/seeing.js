@@ -36,6 +36,7 @@ export class Seeing {
     this.put("held", "Frequencies, held", frequencies(seen.held), why.held, old, "Lowest natural frequencies with all motors held");
     this.put("unheld", "Frequencies, free", frequencies(seen.unheld), why.unheld ?? why.held, old, "Lowest natural frequencies with free motors");
     this.put("compliance", "Compliance", seen.compliance ? `${quantity(seen.compliance.sizes[0], "m/N")}, ${quantity(seen.compliance.sizes[1], "m/N")}` : "", why.compliance ?? why.held, old, "Semi-axes of the ellipse: displacements of the end-effector by a force of 1 N with motors held");
+    this.put("loads", "Left out", "", why.loads, old);
     this.put("torques", "Holding torques", seen.torques ? Object.entries(seen.torques).map(([motor, value]) => `${motor} ${quantity(value, this.unitOf(motor)) || "–"}`).join(", ") || "no motors" : "", why.torques, false, "Torques of these motors that hold gravity, springs and loads");
     this.showChips(seen);
   }
