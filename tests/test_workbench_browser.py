@@ -8,13 +8,16 @@ import time
 import tomllib
 from collections.abc import Callable
 from itertools import combinations
+from pathlib import Path
 
 import pytest
 from playwright.sync_api import Page, expect
 
 from conftest import is_ours
 from paraflex.files import library_text
+from paraflex.files.model import model_of_text
 from paraflex.workbench.document import EMPTY
+from paraflex.workbench.readiness import checked
 from workbenches import served
 
 expect.set_options(timeout=30_000)
@@ -409,6 +412,33 @@ def test_deleting_names_what_goes_as_well(at_work):
     assert person.state["text"] == library_text("five_bar")
 
 
+def test_a_force_on_a_bare_link_is_one_step_and_a_path_is_selected_by_a_click(at_work):
+    person = at_work("five_bar")
+    person.tool("f")
+    (x, y), (u, v) = person.point("proximal1.A1"), person.point("proximal1.B1")
+    person.clicks((x + 0.4 * (u - x), y + 0.4 * (v - y)))
+    data = tomllib.loads(person.state["text"])
+    (load,) = data["load"].values()
+    assert load["point"].split(".")[0] == "proximal1"
+    assert load["point"].split(".")[1] in data["body"]["proximal1"]["points"]
+    person.changes(lambda: person.page.keyboard.press("Control+z"))
+    assert person.state["text"] == library_text("five_bar")
+    person.tool("v")
+    person.until("workbench.state.seen?.path?.length > 0")
+    person.click(*max(person.state["seen"]["path"], key=lambda place: place[1])[:2])
+    person.until("workbench.selected.some(({ kind, name }) => kind === 'path' && name === 'square')")
+
+
+def test_what_info_finds_stands_in_the_line_of_readiness(at_work):
+    person = at_work("five_bar")
+    text = library_text("five_bar").replace("duration = 0.6", "duration = 0.1")
+    person.page.evaluate("text => workbench.request('text', { text })", text)
+    person.until("workbench.state.findings !== undefined")
+    expected = checked(model_of_text(text, "five_bar", Path()))
+    assert person.state["findings"] == expected["findings"] != []
+    assert person.page.locator(".ready").get_attribute("title").endswith(expected["findings"][-1])
+
+
 def test_a_link_is_renamed_and_copied_by_keys(at_work):
     person = at_work("four_bar")
     person.click(*middle_of(person, "crank"))
@@ -422,6 +452,8 @@ def test_a_link_is_renamed_and_copied_by_keys(at_work):
     person.page.locator("canvas.sheet").focus()
     person.changes(lambda: person.page.keyboard.press("Control+d"))
     assert len(tomllib.loads(person.state["text"])["body"]) == 4
+    person.until("workbench.selected.length > 1")
+    assert not {one["name"] for one in person.page.evaluate("workbench.selected")} & {"handle", "ground.O"}
     person.undo_all()
     assert person.state["text"] == library_text("four_bar")
 

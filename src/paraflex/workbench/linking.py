@@ -100,7 +100,7 @@ def add_point(sheet: Sheet, action: Action) -> Done:
     x, y = _xy(action.get("at"), "at")
     local = _turned((x - frame.origin[0], y - frame.origin[1]), -frame.angle)
     on_axis = sheet.data["body"][body].get("type") in ("beam", "assumed-modes")
-    return sheet.put(("body", body, "points", name), local[0] if on_axis else tidy(local)), f"body.{body}"
+    return sheet.put(("body", body, "points", name), local[0] if on_axis else tidy(local)), f"{body}.{name}"
 
 
 def _fields_of(sheet: Sheet, action: Action, kind: type[Joint], a: str, b: str) -> dict[str, float]:

@@ -139,17 +139,12 @@ class Seeing:
         `held` and `unheld` are the lowest natural frequencies with all motors held, and free [Hz]; `compliance` of the
         end-effector with motors held has semi-axes `sizes` [m/N] and the direction `angle` of the larger [rad];
         `chips` have name, motors, number of freedoms driven, and what is lacking; `path` is that of `reach`, None if it
-        has not been asked for.
+        has not been asked for, and `path_name` its name.
         """
         found = self.quick(q, mode)
         why, massless = found["why"], self.massless
-        found |= {
-            "held": None,
-            "unheld": None,
-            "compliance": None,
-            "chips": self._chips(q),
-            "path": self._known_reach(mode),
-        }
+        found |= {"held": None, "unheld": None, "compliance": None, "chips": self._chips(q)}
+        found |= {"path": self._known_reach(mode), "path_name": self._model.path_name() if self._is_planned else ""}
         if massless:
             return {**found, "why": {**why, "held": massless, "compliance": massless}}
         try:
@@ -239,9 +234,12 @@ class Seeing:
             out.append({"name": mode.name, "motors": list(mode.motors), "drives": driven, "lacks": lacks})
         return out
 
+    @property
+    def _is_planned(self) -> bool:
+        return self._mechanism.end_effector is not None and bool(self._model.paths)
+
     def _known_reach(self, mode: str) -> list[list[float]] | None:
-        is_planned = self._mechanism.end_effector is not None and self._model.paths
-        return self._paths.get((self._model.path_name(), mode)) if is_planned else []
+        return self._paths.get((self._model.path_name(), mode)) if self._is_planned else []
 
     def reach(self, mode: str) -> list[list[float]]:
         """Return places of the study's path as [x, y, reach]: 0 out of reach, 1 reached, 2 near a singular position.

@@ -27,7 +27,7 @@ from .turning import turning
 # Actions that name no places on the sheet.
 _WITHOUT_PLACES = ("set", "unset", "rename", "delete", "pose")
 # Requests that take seconds, and do not hold others up.
-SLOW = ("leave",)
+SLOW = ("leave", "check")
 
 
 def _names_places(action: Any) -> bool:

@@ -28,8 +28,8 @@ export class Drawing {
   clicked(place, event, drawn = false) {
     const { name } = this.tools.tool;
     const click = {
-      ground: () => this.addGround(place), point: () => this.addPoint(place), lump: () => this.onPoint(place, "add-lump", "a point of a flexible link"),
-      motor: () => this.onJoint(place, "add-motor"), drive: () => this.onJoint(place, "add-drive"), effector: () => this.setEffector(place), sensor: () => this.addSensor(place),
+      ground: () => this.addGround(place), point: () => this.addPoint(place), lump: () => this.atLink(place, { kind: "add-lump" }, "a point of a flexible link"),
+      motor: () => this.onJoint(place, "add-motor"), drive: () => this.onJoint(place, "add-drive"), effector: () => this.atLink(place, { kind: "set-effector" }, "a point of a link, or the link where the point shall be"), sensor: () => this.addSensor(place),
       gear: () => this.twoJoints(place), spring: () => this.atJointOrPoints(place, "add-spring", drawn), damper: () => this.atJointOrPoints(place, "add-damper", drawn),
       revolute: () => this.joinPoints(place, "revolute"), weld: () => this.joinPoints(place, "weld"), slider: () => this.addSlider(place, 0), load: () => this.addLoad(place, [0, -10]),
     }[name];
@@ -62,36 +62,23 @@ export class Drawing {
     await this.bench.actAll({ kind: "add-ground", at: place.at }, ...joint);
   }
 
-  // The ref of a place: a point that is there, or a new one on the link below it.
-  async refOf(place) {
-    if (place.ref && !place.ref.startsWith("ground.")) return place.ref;
-    const other = this.places.refsAt(place.at).find((one) => !one.startsWith("ground."));
-    if (other || place.ref) return other ?? null;
+  // An action at a point of a link; on a link without a point there, one step that adds it as well.
+  atLink(place, action, what) {
+    const own = (one) => one && !one.startsWith("ground."), ref = own(place.ref) ? place.ref : this.places.refsAt(place.at).find(own);
+    const under = !ref && !place.ref && this.sheet.hitBody(...this.tools.pointer ?? place.px);
+    if (ref) this.bench.act({ ...action, at: ref });
+    else if (under) this.bench.actAll({ kind: "add-point", body: under.name, at: under.foot ?? place.at }, { ...action, at: "@" });
+    else this.missed(what);
+  }
+
+  addPoint(place) {
     const under = this.sheet.hitBody(...this.tools.pointer ?? place.px);
-    if (!under) return null;
-    const before = new Set(this.sheet.shown.points.map(([ref]) => ref));
-    if (!await this.bench.act({ kind: "add-point", body: under.name, at: under.foot ?? place.at })) return null;
-    return this.bench.state.picture?.points.map(([ref]) => ref).find((ref) => !before.has(ref)) ?? null;
-  }
-
-  async addPoint(place) {
     if (place.ref) this.bench.say("There is a point already.", "error");
-    else if (!await this.refOf(place)) this.missed("on a link");
-  }
-
-  async setEffector(place) {
-    const at = await this.refOf(place);
-    if (at) this.bench.act({ kind: "set-effector", at });
-    else this.missed("a point of a link, or the link where the point shall be");
+    else if (under) this.bench.act({ kind: "add-point", body: under.name, at: under.foot ?? place.at });
+    else this.missed("on a link");
   }
 
   missed(what) { if (this.bench.message.dataset.kind !== "error") this.bench.say(`Nothing there: click ${what}.`, "error"); }
-
-  onPoint(place, kind, what) {
-    const ref = this.places.refsAt(place.at).find((one) => !one.startsWith("ground."));
-    if (ref) this.bench.act({ kind, at: ref });
-    else this.missed(what);
-  }
 
   onJoint(place, kind) {
     const [joint] = this.places.jointsAt(place.at);
@@ -157,11 +144,7 @@ export class Drawing {
     return [Math.round((px - start.px[0]) * FORCE), Math.round((start.px[1] - py) * FORCE)];
   }
 
-  async addLoad(place, force) {
-    const at = await this.refOf(place);
-    if (at) this.bench.act({ kind: "add-load", at, force });
-    else this.missed("a point of a link");
-  }
+  addLoad(place, force) { this.atLink(place, { kind: "add-load", force }, "a point of a link"); }
 
   addSensor(place) {
     const [joint] = this.places.jointsAt(place.at), ref = this.places.refsAt(place.at).find((one) => !one.startsWith("ground."));

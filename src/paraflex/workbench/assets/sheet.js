@@ -267,7 +267,7 @@ export class Sheet {
     };
     for (const [name, , x, y] of shown.joints) offer("joint", name, x, y);
     for (const [ref, x, y] of shown.points) offer("point", ref, x, y);
-    return best ?? this.hitBody(px, py) ?? this.hitMark(px, py);
+    return best ?? this.hitBody(px, py) ?? this.hitMark(px, py) ?? this.hitPath(px, py);
   }
 
   // A spring, a load or a sensor, which have no place of their own.
@@ -275,6 +275,11 @@ export class Sheet {
     const found = this.shown.marks.find(([, look, name, points]) => name && ACTING.includes(look) && this.near(px, py, points, 7));
     const thing = found && (this.bench.state.outline ?? []).find(({ kind, name }) => name === found[2] && kind.includes(found[1]));
     return thing ? { kind: thing.kind, name: thing.name, at: this.metres(px, py) } : null;
+  }
+
+  hitPath(px, py) {
+    const { path, path_name: name } = this.bench.state.seen ?? {};
+    return name && path?.length && this.near(px, py, path, 6) ? { kind: "path", name, at: this.metres(px, py) } : null;
   }
 
   near(px, py, points, least) {

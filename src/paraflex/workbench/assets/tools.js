@@ -104,6 +104,7 @@ export class Tools {
     if (!ready) return;
     this.ready.textContent = ready.sentence;
     this.ready.dataset.ok = !!ready.ok;
+    this.ready.title = [ready.ok ? "Run" : "Click to go there", ...(this.bench.state.findings ?? [])].join("\n");
   }
 
   goReady() {

@@ -13,6 +13,7 @@ import { TextPane } from "./text.js";
 import { Tools } from "./tools.js";
 
 const THEMES = ["auto", "light", "dark"];
+const CHECKED = 300; // time after a change until all checks are made [ms]
 const ARROWS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] };
 const KEYS = [
   ["Letters", "tools, as beside their names"], ["Escape", "ends what was begun; then the select tool"], ["Enter", "ends a link or path of several points; sets a point at the cursor of the arrows"],
@@ -142,6 +143,17 @@ class Workbench {
       state.seen.path = found.path;
       state.ready = found.ready;
     }
+    this.notify("reach");
+    clearTimeout(this.checking);
+    if (state.ready?.ok && !state.findings) this.checking = setTimeout(() => this.check(), CHECKED);
+  }
+
+  // What `paraflex info` finds takes longer still; the line of readiness has it if a run would be wrong.
+  async check() {
+    const { state } = this, found = await this.link.ask("check").catch(() => null);
+    if (!found || state !== this.state) return;
+    state.findings = found.findings;
+    if (!found.ok) state.ready = found;
     this.notify("reach");
   }
 
@@ -283,11 +295,19 @@ class Workbench {
 
   copy() {
     const by = 2 * this.sheet.step;
-    if (this.selected.length) this.act({ kind: "copy", names: this.selected.map((one) => this.nameOf(one)), by: [by, -by] });
+    this.double({ kind: "copy", by: [by, -by] });
   }
 
-  mirror(axis) {
-    if (this.selected.length) this.act({ kind: "mirror", names: this.selected.map((one) => this.nameOf(one)), axis, about: 0 });
+  mirror(axis) { this.double({ kind: "mirror", axis, about: 0 }); }
+
+  // What a copy or an image adds is selected.
+  async double(action) {
+    const { bodies, points } = this.state.picture ?? {}, before = new Set([...(bodies ?? []), ...(points ?? [])].map(([name]) => name));
+    if (!this.selected.length || !await this.act({ ...action, names: this.selected.map((one) => this.nameOf(one)) })) return;
+    const fresh = (kind, all) => all.map(([name]) => name).filter((name) => !before.has(name) && (kind === "body" || name.startsWith("ground."))).map((name) => ({ kind, name }));
+    const { picture } = this.state;
+    this.selected = [...fresh("body", picture.bodies), ...fresh("point", picture.points)];
+    this.notify("selected");
   }
 
   nudge([dx, dy]) {
