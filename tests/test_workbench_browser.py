@@ -439,6 +439,20 @@ def test_what_info_finds_stands_in_the_line_of_readiness(at_work):
     assert person.page.locator(".ready").get_attribute("title").endswith(expected["findings"][-1])
 
 
+def test_the_panel_is_widened_by_mouse_and_keys(at_work):
+    person = at_work("five_bar")
+    divider, side = person.page.get_by_role("separator", name="Width of the panel"), person.page.locator(".side")
+    before, box = side.bounding_box(), divider.bounding_box()
+    person.page.mouse.move(box["x"] + 3, box["y"] + 300)
+    person.page.mouse.down()
+    person.page.mouse.move(box["x"] - 117, box["y"] + 300, steps=3)
+    person.page.mouse.up()
+    assert side.bounding_box()["width"] == pytest.approx(before["width"] + 120, abs=5)
+    divider.focus()
+    person.page.keyboard.press("ArrowRight")
+    assert side.bounding_box()["width"] == pytest.approx(before["width"] + 100, abs=5)
+
+
 def test_a_link_is_renamed_and_copied_by_keys(at_work):
     person = at_work("four_bar")
     person.click(*middle_of(person, "crank"))

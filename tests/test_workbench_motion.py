@@ -199,10 +199,17 @@ def test_what_is_taken_away(at_work):
     assert "pf.Mechanism(" in text
     person.page.keyboard.press("Escape")
     menu.click()
-    with person.page.expect_download() as figure:
-        person.page.get_by_role("menuitem", name="SVG").click()
-    assert figure.value.suggested_filename.endswith(".svg")
-    menu.click()
+    for name, ending, head in [
+        ("SVG", ".svg", b"<?xml"),
+        ("PDF", ".pdf", b"%PDF"),
+        ("PNG", ".png", b"\x89PNG"),
+        ("Film", ".gif", b"GIF8"),
+    ]:
+        with person.page.expect_download() as made:
+            person.page.get_by_role("menuitem", name=name).click()
+        assert made.value.suggested_filename.endswith(ending)
+        assert made.value.path().read_bytes().startswith(head)
+        menu.click()
     with person.page.expect_popup() as report:
         person.page.get_by_role("menuitem", name="Report").click()
     report.value.wait_for_url("**/report.html")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import base64
 import re
 from pathlib import Path
 
@@ -23,8 +24,8 @@ def sent(monkeypatch: pytest.MonkeyPatch, tmp_path: Path):
     return found
 
 
-def ask(widget, sent, what, **fields):
-    widget._handle_custom_msg({"id": 7, "do": what, **fields}, [])
+def ask(widget, sent, do, **fields):
+    widget._handle_custom_msg({"id": 7, "do": do, **fields}, [])
     found = sent[-1]
     assert found["id"] == 7
     return found
@@ -37,6 +38,11 @@ def test_the_widget_answers_as_the_server_does(sent):
     assert ask(widget, sent, "text", text=changed)["ok"]["undo"]
     assert widget.edited.mechanism.body("proximal1").length == 0.3
     assert "error" in ask(widget, sent, "nonsense")
+
+
+def test_what_is_made_for_a_page_is_in_the_reply(sent):
+    made = ask(pf.edit("five_bar"), sent, "leave", what="svg")["ok"]
+    assert b"<svg" in base64.b64decode(made["data"])
 
 
 def test_models_of_python_can_be_edited(sent):

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import base64
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from paraflex.errors import InputError
 from .document import Document
+from .messages import Message
 from .page import module, style
 from .session import EditSession
 
@@ -42,7 +44,7 @@ def edit(model: Model | Mechanism | str | Path | None = None) -> Any:
         def __init__(self, document: Document) -> None:
             super().__init__()
             self.session = EditSession(document, self.send)
-            self.on_msg(lambda _, message, __: self.send(self.session.answer(message)))
+            self.on_msg(lambda _, message, __: self.send(_with_data(self.session.answer(message))))
 
         @property
         def text(self) -> str:
@@ -55,6 +57,14 @@ def edit(model: Model | Mechanism | str | Path | None = None) -> Any:
             return self.session.bench.read()
 
     return Workbench(_document(model))
+
+
+def _with_data(reply: Message) -> Message:
+    """Return a reply with the contents of the file that it names, as a notebook has no server for it."""
+    made = reply.get("ok", {}).get("file") if "address" in reply.get("ok", {}) else None
+    if made is None:
+        return reply
+    return {**reply, "ok": {**reply["ok"], "data": base64.b64encode(Path(made).read_bytes()).decode("ascii")}}
 
 
 def _document(model: Model | Mechanism | str | Path | None) -> Document:

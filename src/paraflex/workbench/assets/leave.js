@@ -42,12 +42,14 @@ export class Leave {
     const found = await this.bench.request("leave", { what });
     this.opener.disabled = false;
     if (!found) { tab?.close(); return; }
+    // A notebook has no server: the file itself is in the reply.
+    if (found.data) found.address = URL.createObjectURL(new Blob([Uint8Array.from(atob(found.data), (one) => one.charCodeAt(0))], { type: tab ? "text/html" : "" }));
     if (found.text !== undefined) this.showText(what, label, found.text);
     else if (tab) { tab.location = new URL(found.address, location.href); this.bench.say("The report is in a new tab."); } else this.offer(what, label, found);
   }
 
   offer(what, label, { address, file }) {
-    const link = element("a", { href: address, ...(what === "report" ? { target: "_blank" } : { download: "" }) }, `${label}: ${(file ?? address).split(/[\\/]/).pop()}`);
+    const name = (file ?? address).split(/[\\/]/).pop(), link = element("a", { href: address, ...(what === "report" ? { target: "_blank" } : { download: name }) }, `${label}: ${name}`);
     if (what !== "report") link.click();
     this.bench.say("");
     this.bench.message.append(link);

@@ -64,6 +64,7 @@ class Workbench {
       side: element("aside", { class: "side", "aria-label": "Numbers" }, this.strip), dock: element("footer", { class: "dock" }),
     };
     this.root.replaceChildren(...Object.values(this.parts));
+    this.parts.side.append(this.divider());
     this.title = element("button", { type: "button", class: "title", title: "Save (Ctrl+S)", onclick: () => this.save() });
     this.steps = { undo: button("↶", "Undo (Ctrl+Z)", () => this.step("undo"), { class: "icon" }), redo: button("↷", "Redo (Ctrl+Shift+Z)", () => this.step("redo"), { class: "icon" }) };
     this.parts.bar.append(
@@ -74,6 +75,21 @@ class Workbench {
       this.toggle("#", "Grid", "grid"), this.toggle("Aa", "Names", "names"),
       button("◐", "Theme: light, dark or that of the system", () => this.nextTheme(), { class: "icon" }), button("?", "Keys", () => this.showKeys(), { class: "icon" }),
     );
+  }
+
+  // The left edge of the side panel, which is dragged or moved by arrows.
+  divider() {
+    const made = element("div", { class: "divider", role: "separator", tabindex: "0", "aria-orientation": "vertical", "aria-label": "Width of the panel", title: "Drag, or use arrows: width of the panel" });
+    const widen = (width) => this.root.style.setProperty("--side", `${Math.min(Math.max(width, 240), 0.7 * this.root.clientWidth)}px`);
+    made.addEventListener("pointerdown", ({ pointerId }) => made.setPointerCapture(pointerId));
+    made.addEventListener("pointermove", ({ clientX, pointerId }) => { if (made.hasPointerCapture(pointerId)) widen(this.root.getBoundingClientRect().right - clientX); });
+    made.addEventListener("keydown", (event) => {
+      const by = { ArrowLeft: 20, ArrowRight: -20 }[event.key];
+      if (!by) return;
+      widen(this.parts.side.clientWidth + by);
+      event.preventDefault();
+    });
+    return made;
   }
 
   toggle(text, title, what) {
