@@ -468,6 +468,10 @@ def test_a_link_is_renamed_and_copied_by_keys(at_work):
     assert len(tomllib.loads(person.state["text"])["body"]) == 4
     person.until("workbench.selected.length > 1")
     assert not {one["name"] for one in person.page.evaluate("workbench.selected")} & {"handle", "ground.O"}
+    before = person.state["picture"]["points"]
+    person.changes(lambda: person.page.keyboard.press("ArrowRight"))
+    moved = [ref for (ref, *at), (_, *now) in zip(before, person.state["picture"]["points"], strict=True) if at != now]
+    assert sorted(ref.startswith("ground.") for ref in moved) == [False, False, True]
     person.undo_all()
     assert person.state["text"] == library_text("four_bar")
 

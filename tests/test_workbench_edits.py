@@ -637,3 +637,32 @@ def test_a_driven_crank_begins_where_a_person_puts_it():
     turned = {**begun.angles, "crank": begun.angles["crank"] + 0.25}
     kept = Sheet(apply(moved.text, {"kind": "pose", "angles": turned}).text)
     assert kept.number(begins) == pytest.approx(math.pi / 2.0 + 0.25, abs=1e-5)
+
+
+def drawn_places(text):
+    sheet = Sheet(text)
+    return {ref: sheet.place(ref, sheet.shown) for ref in sheet.refs}
+
+
+def test_a_linkage_is_moved_as_a_whole():
+    text = library_file("four_bar").read_text(encoding="utf-8")
+    names = ["body.crank", "body.coupler", "body.rocker"]
+    moved = apply(text, {"kind": "move", "names": names, "by": [0.03, -0.02]}).text
+    before, after = drawn_places(text), drawn_places(moved)
+    for ref, (x, y) in before.items():
+        assert after[ref] == pytest.approx((x + 0.03, y - 0.02), abs=1e-9), ref
+    assert tomllib.loads(moved)["body"] == tomllib.loads(text)["body"]
+    back = apply(moved, {"kind": "move", "names": names, "by": [-0.03, 0.02]}).text
+    assert drawn_places(back) == {ref: pytest.approx(at, abs=1e-9) for ref, at in before.items()}
+    assert tomllib.loads(moved)["ground"]["Q"][0] == "base + 0.03"
+    assert back == text
+    with pytest.raises(InputError, match=r"joint.* joined to what stays .*select coupler as well"):
+        apply(text, {"kind": "move", "names": names[:1], "by": [0.03, 0.0]})
+
+
+def test_several_points_move_by_the_same_step():
+    text = library_file("four_bar").read_text(encoding="utf-8")
+    moved = apply(text, {"kind": "move", "names": ["crank.A", "ground.O"], "by": [0.0, 0.01]}).text
+    before, after = drawn_places(text), drawn_places(moved)
+    for ref in ("ground.O", "crank.O", "crank.A", "coupler.A"):
+        assert after[ref] == pytest.approx((before[ref][0], before[ref][1] + 0.01), abs=1e-6), ref

@@ -1,23 +1,27 @@
 """Actions that change, rename, copy and delete what is there."""
 
-from collections.abc import Callable, Mapping, Sequence
+import re
+from collections.abc import Callable, Collection, Mapping, Sequence
 from contextlib import suppress
 from math import dist, isfinite, pi
 from typing import Any
 
 from paraflex.errors import InputError
+from paraflex.expressions.evaluate import names_in
 from paraflex.files.fields import Place, field_at, value_at
 from paraflex.files.overlay import value_of
 from paraflex.files.schema import ModelTable
 from paraflex.mechanism.joints import GROUND
 from paraflex.mechanism.poses import Pose
 from .dependents import Use, falling, replaced, spelt, thing_of, uses
-from .edits import renamed, with_value, written
-from .moving_points import with_starts
+from .edits import number_text, renamed, with_value, written
+from .moving_points import joined_to, move_point, with_number, with_starts
 from .sheet import XY, Action, Done, Sheet, check_name, near, placed, tidy
 
 # Length by which the inertia of a block is that of a rod [m].
 _BLOCK = 0.05
+# Number that ends an expression, after a sum or difference, and steps that are rounding [m].
+_LAST_TERM, _NO_STEP = re.compile(r" [+-] [0-9.]+(?:e[+-]?[0-9]+)?$"), 1e-12
 # Members that are copied together with the joints and points that they name.
 _COPIED = ("joint", "spring", "damper", "friction", "linear_spring", "load", "sensor")
 
@@ -180,6 +184,58 @@ def mirrored(sheet: Sheet, action: Action) -> Done:
     return _doubled(sheet, action, lambda at: Pose(pi - at.angle, (2 * line - _xy(at)[0], _xy(at)[1])), mirrored=True)
 
 
+def moved(sheet: Sheet, action: Action) -> Done:
+    """Move points, or whole linkages with the ground points that hold them, by the same step."""
+    by, before = [float(each) for each in action.get("by") or ()], sheet
+    things = [thing_of(sheet.data, name) for name in action.get("names") or ()]
+    if len(by) != 2 or not things or any(thing[0] not in ("body", GROUND) for thing in things):
+        raise InputError("nothing to move", field="names", value=action.get("names"), remedy="choose links or points")
+    bodies = {str(thing[1]) for thing in things if thing[0] == "body" and len(thing) == 2}
+    points = [f"{thing[1]}.{thing[-1]}" if thing[0] == "body" else ".".join(map(str, thing)) for thing in things
+              if len(thing) == 4 or thing[0] == GROUND]  # fmt: skip
+    pivots = [f"{GROUND}.{name}" for name in _pivots(sheet, list(bodies))]
+    carried = {ref for ref in pivots + points if bodies and ref.startswith(f"{GROUND}.")}
+    _check_whole(sheet, bodies, carried)
+    for ref in carried:
+        sheet = _shifted(sheet, (GROUND, ref.partition(".")[2]), by)
+    for assembly in sheet.names("assembly") if bodies else ():
+        for ref in value_at(sheet.data, ("assembly", assembly, "points")) or {}:
+            if ref.partition(".")[0] in bodies:
+                sheet = _shifted(sheet, ("assembly", assembly, "points", ref), by)
+    done = {ref for ref in before.refs if ref in carried or ref.partition(".")[0] in bodies}
+    for ref in points:
+        if ref not in done:
+            x, y = before.place(ref, before.shown)
+            sheet, _ = move_point(sheet, {"ref": ref, "to": [x + by[0], y + by[1]]})
+            done.update(joined_to(before, ref))
+    return sheet, spelt(things[-1])
+
+
+def _check_whole(sheet: Sheet, bodies: Collection[str], grounds: Collection[str]) -> None:
+    """Check that nothing else is joined to bodies that are moved, or to the ground points that move with them."""
+    for joint in sheet.joints if bodies else ():
+        moving = [one.body in bodies or str(one) in grounds for one in (joint.a, joint.b)]
+        if any(moving) and not all(moving):
+            left = joint.b if moving[0] else joint.a
+            remedy = f"select {left.point if left.on_ground else left.body} as well"
+            raise InputError("joined to what stays", field=f"joint.{joint.name}", value=str(left), remedy=remedy)
+
+
+def _shifted(sheet: Sheet, place: Place, by: Sequence[float]) -> Sheet:
+    """Move a point; an expression of parameters has the step added as its last term."""
+    for k in (0, 1):
+        old, to = value_at(sheet.data, (*place, k)), sheet.number((*place, k)) + by[k]
+        if isinstance(old, str) and names_in(old) & sheet.parameters.keys():
+            term = _LAST_TERM.search(old)
+            last = float(term[0].replace(" ", "")) + by[k] if term else by[k]
+            rest = old[: term.start()] if term else old
+            more = f" {'-' if last < 0.0 else '+'} {number_text(abs(last))}" if abs(last) > _NO_STEP else ""
+            sheet = sheet.put((*place, k), rest + more)
+        else:
+            sheet = with_number(sheet, (*place, k), to)
+    return sheet
+
+
 def _doubled(sheet: Sheet, action: Action, image: Callable[[Pose], Pose], *, mirrored: bool) -> Done:
     """Add the image of members under new names."""
     before, named = sheet, [thing_of(sheet.data, name) for name in action.get("names") or ()]
@@ -311,5 +367,5 @@ def _value(sheet: Sheet, use: Use) -> list[float]:
 
 CHANGING: dict[str, Callable[[Sheet, Action], Done]] = {
     "set": set_value, "unset": unset, "rename": rename, "copy": copied, "mirror": mirrored, "delete": delete,
-    "pose": pose,
+    "move": moved, "pose": pose,
 }  # fmt: skip

@@ -17,7 +17,7 @@ const CHECKED = 300; // time after a change until all checks are made [ms]
 const ARROWS = { ArrowLeft: [-1, 0], ArrowRight: [1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] };
 const KEYS = [
   ["Letters", "tools, as beside their names"], ["Escape", "ends what was begun; then the select tool"], ["Enter", "ends a link or path of several points; sets a point at the cursor of the arrows"],
-  ["Arrows", "move the selected point by one step of the grid, or the cursor of a drawing tool"], ["Alt", "no snapping to the grid"], ["Shift", "adds to the selection; a link with more points"],
+  ["Arrows", "move what is selected by one step of the grid, or the cursor of a drawing tool"], ["Alt", "no snapping to the grid"], ["Shift", "adds to the selection; a link with more points"],
   ["Delete", "deletes the selection"], ["F2", "renames it"], ["Ctrl+D", "copies it"], ["Ctrl+Z, Ctrl+Y", "undo and redo"], ["Ctrl+S", "saves"], ["Space", "plays the motion; held while dragging it moves the sheet"],
   ["Arrows on the slider of time", "frame by frame; with Shift ten at a time"], ["0 or Home", "shows all"], ["Wheel, two fingers", "zoom; the middle button moves the sheet"],
 ];
@@ -327,10 +327,9 @@ class Workbench {
   }
 
   nudge([dx, dy]) {
-    const point = this.selected.length === 1 && this.sheet.places.pointOf(this.selected[0]);
-    if (!point) return false;
-    const [ref, x, y] = point, { step } = this.sheet;
-    this.act({ kind: "move-point", ref, to: [x + dx * step, y + dy * step] });
+    const names = this.selected.map((one) => (one.kind === "body" ? this.nameOf(one) : this.sheet.places.pointOf(one)?.[0])).filter(Boolean), { step } = this.sheet;
+    if (!names.length) return false;
+    this.act({ kind: "move", names, by: [dx * step, dy * step] });
     return true;
   }
 
