@@ -189,6 +189,20 @@ def test_a_change_runs_again_beside_the_run_before(at_work):
     expect(person.page.locator(".drawer .legend").first).to_contain_text("before")
 
 
+def test_a_long_run_is_described_and_can_be_stopped(at_work):
+    person = at_work("five_bar")
+    text = person.state["text"].replace("samples = 601", "samples = 601\nstep = 1e-6")
+    person.page.get_by_label("auto").uncheck()
+    person.page.evaluate("text => workbench.request('text', { text })", text)
+    person.page.get_by_role("button", name=re.compile("Run$")).click()
+    stop = person.page.get_by_role("button", name="Stop")
+    expect(stop).to_be_visible()
+    person.until("workbench.motion.doing.textContent === 'a first look'")
+    stop.click()
+    expect(stop).to_be_hidden()
+    assert person.page.evaluate("workbench.motion.recordings.run?.accuracy?.coarse !== false")
+
+
 def test_what_is_taken_away(at_work):
     person = at_work("five_bar")
     menu = person.page.get_by_role("button", name="Export")

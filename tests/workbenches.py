@@ -29,7 +29,7 @@ class Talk:
 
     def __init__(self, address: str, **options: Any) -> None:
         self.origin = re.match(r"http://[^/]+", address)[0]  # type: ignore[index]
-        options = {"origin": self.origin, "max_size": None, "proxy": None, **options}
+        options = {"origin": self.origin, "max_size": None, "proxy": None, "close_timeout": 1, **options}
         # Entered and never left: the socket is closed by the test or with its process.
         self.socket: ClientConnection = connect(address.replace("http", "ws", 1) + "socket", **options).__enter__()
         self.events: list[dict[str, Any]] = []

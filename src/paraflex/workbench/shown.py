@@ -15,7 +15,7 @@ from paraflex.reports.packing import deflated
 from paraflex.reports.page import Page, page_data
 from paraflex.results.beam_stresses import stresses_of
 from paraflex.results.findings import finding_lines, verdict_of
-from paraflex.results.following import headline
+from paraflex.results.following import below_tolerance_line, headline
 from paraflex.results.numbers import finite_or_none, largest
 from .computing import Computed
 
@@ -55,13 +55,15 @@ def shown(found: Computed, *, charts: bool = True) -> dict[str, Any]:
     page = kind_page(data) if charts else Page("", "", time=few["time"].values)
     page = replace(page, runs=modes, selected=selected, film=animation(few, dims))
     verdict = verdict_of(data)
+    numbers = [_numbers(data.sel(mode=mode) if dims else data, mode) for mode in modes]
+    too_small = below_tolerance_line({one["mode"]: one["error_rms"] for one in numbers}, found.tolerance or 0.0)
     return {
         "modes": modes,
         "page": page_data(page),
         "stress": station_stresses(few),
-        "numbers": [_numbers(data.sel(mode=mode) if dims else data, mode) for mode in modes],
+        "numbers": numbers,
         "errors": [error_of(error) | {"mode": mode} for mode, error in found.errors.items()],
-        "findings": finding_lines(verdict),
+        "findings": [*finding_lines(verdict), *([too_small] if too_small else [])],
         "verdict": verdict.level.value,
     }
 

@@ -31,7 +31,7 @@ export class Dragging {
     Object.assign(this, { bench, tools, sheet: bench.sheet });
     this.drag = new Newest(bench, "drag", (found) => this.dragged(found));
     this.badge = element("span", { class: "badge", hidden: true });
-    this.posed = element("div", { class: "posed", hidden: true },
+    this.posed = element("div", { class: "posed", hidden: true }, element("small", {}, "Runs begin in the pose of the file."),
       button("Keep this pose", "The dragged pose becomes the assembly of the file", () => bench.request("pose"), { class: "main" }),
       button("Back", "The assembly of the file again", () => this.back()));
     bench.parts.stage.append(this.badge, this.posed);

@@ -13,6 +13,7 @@ export class Drawing {
     const { name } = this.tools.tool, dragged = held.far && !this.sameplace(held.start, end);
     if (name === "slider") this.addSlider(held.start, dragged ? this.direction(held.start, event) : 0);
     else if (name === "load") this.addLoad(held.start, dragged ? this.force(held.start) : [0, -10]);
+    else if (name === "point" && dragged) this.addPoint(held.start, end);
     else if (dragged && !this.begun.length && ["link", "beam", "path", "spring", "damper", "revolute", "weld", "gear", "plate"].includes(name)) {
       this.clicked(held.start, event, true);
       this.clicked(end, event, true);
@@ -71,10 +72,11 @@ export class Drawing {
     else this.missed(what);
   }
 
-  addPoint(place) {
-    const under = this.sheet.hitBody(...this.tools.pointer ?? place.px);
-    if (place.ref) this.bench.say("There is a point already.", "error");
-    else if (under) this.bench.act({ kind: "add-point", body: under.name, at: under.foot ?? place.at });
+  // On a link, or beside it where a press on the link is released.
+  addPoint(place, end) {
+    const under = this.sheet.hitBody(...(end ? place.px : this.tools.pointer ?? place.px));
+    if ((end ?? place).ref) this.bench.say("There is a point already.", "error");
+    else if (under) this.bench.act({ kind: "add-point", body: under.name, at: end?.at ?? under.foot ?? place.at });
     else this.missed("on a link");
   }
 

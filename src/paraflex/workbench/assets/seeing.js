@@ -30,12 +30,12 @@ export class Seeing {
     if (!seen) return;
     const why = seen.why ?? {}, { old } = this;
     this.given = new Set();
-    this.put("freedoms", "Degrees of freedom", freedomsText(seen), why.freedoms);
+    this.put("freedoms", "Degrees of freedom", freedomsText(seen, this.bench.state.picture?.joints.some((one) => one[4])), why.freedoms);
     this.put("condition", "Condition number", seen.condition === null || seen.condition === undefined ? "" : shortNumber(seen.condition, 3), seen.freedoms ? why.condition ?? "no task that these motors drive" : "", false, "Largest by smallest effort in the task per torque of these motors; 1 is best");
     this.bars(seen);
-    this.put("held", "Frequencies, held", frequencies(seen.held), why.held, old, "Lowest natural frequencies with all motors held");
-    this.put("unheld", "Frequencies, free", frequencies(seen.unheld), why.unheld ?? why.held, old, "Lowest natural frequencies with free motors");
-    this.put("compliance", "Compliance", seen.compliance ? `${quantity(seen.compliance.sizes[0], "m/N")}, ${quantity(seen.compliance.sizes[1], "m/N")}` : "", why.compliance ?? why.held, old, "Semi-axes of the ellipse: displacements of the end-effector by a force of 1 N with motors held");
+    this.put("held", "Frequencies, all motors held", frequencies(seen.held), why.held, old, "Lowest natural frequencies with all motors held");
+    this.put("unheld", "Frequencies, motors free", frequencies(seen.unheld), why.unheld ?? why.held, old, "Lowest natural frequencies with free motors");
+    this.put("compliance", "Compliance, all held", seen.compliance ? `${quantity(seen.compliance.sizes[0], "m/N")}, ${quantity(seen.compliance.sizes[1], "m/N")}` : "", why.compliance ?? why.held, old, "Semi-axes of the ellipse: displacements of the end-effector by a force of 1 N with motors held");
     this.put("loads", "Left out", "", why.loads, old);
     this.put("torques", "Holding torques", seen.torques ? Object.entries(seen.torques).map(([motor, value]) => `${motor} ${quantity(value, this.unitOf(motor)) || "–"}`).join(", ") || "no motors" : "", why.torques, false, "Torques of these motors that hold gravity, springs and loads");
     this.showChips(seen);
@@ -203,9 +203,9 @@ export class Seeing {
   }
 }
 
-function freedomsText({ freedoms, drives }) {
+function freedomsText({ freedoms, drives }, motors) {
   if (freedoms === null || freedoms === undefined) return "";
-  return drives === undefined || drives === freedoms ? `${freedoms}` : `${freedoms}, of which these motors drive ${drives}`;
+  return drives === undefined || drives === freedoms || !motors ? `${freedoms}` : `${freedoms}, of which these motors drive ${drives}`;
 }
 
 function frequencies(values) { return values?.length ? `${values.map((one) => shortNumber(one, 3)).join(", ")} Hz` : ""; }

@@ -12,7 +12,7 @@ const GROUPS = [
     ["link", "Link", "l", "crosshair", "Press at one end and drag to the other, or click both; Shift: more points."],
     ["beam", "Flexible link", "b", "crosshair", "Press at one end of the beam and drag to the other, or click both."],
     ["plate", "Link of points", "t", "crosshair", "Click each point of the link; Enter or a click on the last one ends it."],
-    ["point", "Further point", "o", "crosshair", "Click on a link: it gets a point there."]],
+    ["point", "Further point", "o", "crosshair", "Click on a link: it gets a point there. Press on a link and release beside it: the point is there."]],
   [["revolute", "Revolute joint", "r", "pointer", "Click a point, then the point to which it is joined."],
     ["slider", "Slider", "s", "crosshair", "Press at a point and drag along the rail; a click: a horizontal rail, or a slot along the link below the point."],
     ["weld", "Weld", "w", "pointer", "Click a point, then the point to which it is welded; on a joint: it becomes a weld."]],
