@@ -41,8 +41,9 @@ if signal.getsignal(signal.SIGHUP) is signal.SIG_IGN:
     signal.signal(signal.SIGHUP, signal.SIG_DFL)
 # The files that take longest, begun first: at the end no worker is left with one of them while the other is idle.
 LONGEST = (
-    "test_docs", "test_notebooks", "test_workbench_runs", "test_workbench_browser", "test_interrupts", "test_examples", "test_extending", "test_plot_command",
-    "test_sweep_engines", "test_tangent", "test_loads_in_time", "test_report_browser", "test_gears", "test_statics",
+    "test_docs", "test_notebooks", "test_workbench_runs", "test_workbench_browser", "test_interrupts", "test_examples",
+    "test_extending", "test_plot_command", "test_sweep_engines", "test_tangent", "test_loads_in_time",
+    "test_report_browser", "test_gears", "test_statics",
     "test_compilation", "test_workbench_motion", "test_workbench_host", "test_workbench_moving", "test_replacing",
     "test_verification", "test_kills", "test_fuzzing",
 )  # fmt: skip

@@ -16,9 +16,10 @@ from paraflex.errors import InputError
 from paraflex.files import Model
 from paraflex.linear import LinearModel, linearise
 from paraflex.mechanism import ConstantSpeed, Mechanism, RigidBody
+from paraflex.mechanism.masses import with_any_masses
 from paraflex.plots.scene import is_plate, scene
 from paraflex.results.findings import finding_lines
-from paraflex.results.linear_data import end_effector_outputs
+from paraflex.results.linear_data import end_effector_outputs, motors_of
 from paraflex.results.posed import posed_at
 from .seeing import Seeing
 
@@ -70,6 +71,9 @@ def drag_force(model: Model, q: Array, ref: str, force: Sequence[float], *, buck
 def _held(model: Model, q: Array) -> tuple[Mechanism, list[str]]:
     """Return the mechanism without prescribed motions, and the joints that are held, theirs included."""
     mechanism = replace(model.mechanism, prescribed=())
+    if not any(mechanism.gravity):
+        # Without weight masses have no effect at rest.
+        mechanism = with_any_masses(mechanism)
     springs = bool(mechanism.springs or mechanism.linear_springs)
     if not (springs or any(not isinstance(body, RigidBody) and body.flexible for body in mechanism.bodies)):
         raise InputError("no link is flexible: a force bends nothing", field="body", remedy="make a link flexible")
@@ -134,12 +138,12 @@ def linear(model: Model, q: Array, mode: str) -> dict[str, Any]:
     """Return the linear model at rest in a rigid pose q (n,) with the motors of a mode; empty for all motors.
 
     The dict has `poles`, the slowest as [real part [1/s], imaginary part [rad/s], frequency [Hz], damping ratio],
-    without the lower halves of pairs; `held`, the lowest natural frequencies with all motors held, also those of other
-    modes, and prescribed motions at rest, as in `Seeing.full` [Hz], empty if nothing is driven; `unbalanced`,
-    the acceleration with which the mechanism would start [m/s^2]; `input`, the name of the first motor or prescribed
-    motion, else of a force at the end-effector; `frequency` [Hz]; and `responses` of the end-effector, else of the
-    motor's joint or the sensors, as far as they respond: `output`, `unit`, `magnitude` [dB] and `phase` [degrees].
-    InputError: there are no inputs, or no degrees of freedom.
+    without the lower halves of pairs; `held`, the lowest natural frequencies with these motors held and prescribed
+    motions at rest, as in `Seeing.full` [Hz], empty if nothing is driven; `unbalanced`, the acceleration with which the
+    mechanism would start [m/s^2]; `input`, the name of the first motor or prescribed motion, else of a force at the
+    end-effector; `frequency` [Hz]; and `responses` of the end-effector, else of the motor's joint or the sensors, as
+    far as they respond: `output`, `unit`, `magnitude` [dB] and `phase` [degrees]. InputError: there are no inputs, or
+    no degrees of freedom.
     """
     mechanism = _standing(model.mechanism, q)
     driven, effector = bool(mechanism.motors or mechanism.prescribed), mechanism.end_effector
@@ -148,8 +152,7 @@ def linear(model: Model, q: Array, mode: str) -> dict[str, Any]:
         raise InputError("nothing excites it: no motor, drive or end-effector", field="motor", remedy=remedy)
     forced = [] if driven or effector is None else [str(effector.point)]
     found = linearise(mechanism, mode=mode or None, start=_undeformed(mechanism, q), forces=forced)
-    every = [motor.name for motor in mechanism.motors]
-    poles, held = found.poles(), found.held_frequencies(every) / (2.0 * np.pi)
+    poles, held = found.poles(), found.held_frequencies(motors_of(found)) / (2.0 * np.pi)
     frequency = _frequencies(np.concatenate([np.abs(poles) / (2.0 * np.pi), held]))
     return {
         "poles": [_pole(pole) for pole in poles if pole.imag >= 0.0][:_POLES],

@@ -114,12 +114,14 @@ class Document:
     def take_up(self) -> bool:
         """Make the text that another program has written to the file the next step; return whether there was one."""
         stamp = self._stamped()
-        if self.file is None or stamp == self._stamp or not stamp:
+        if self.file is None or stamp == self._stamp:
             return False
         try:
             text = read_text(self.file)
         except InputError:
-            return False
+            # A file that is gone, or no text any more, is not what was saved.
+            lost, self._stamp, self._on_disk = self.saved, stamp, ""
+            return lost
         self._stamp, self._mark = stamp, self._marked()
         if text == self._on_disk:
             return False

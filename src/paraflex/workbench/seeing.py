@@ -59,7 +59,10 @@ class Seeing:
 
     @cached_property
     def _flexible(self) -> System:
-        return build_system(self._mechanism, like=self._like)
+        # A link whose length has changed may have another mesh, and then another system.
+        with suppress(InputError):
+            return build_system(self._mechanism, like=self._like)
+        return build_system(self._mechanism)
 
     @cached_property
     def massless(self) -> str:
@@ -70,9 +73,9 @@ class Seeing:
             return f"{error.field} {error.problem.partition(',')[0]}"
         return ""
 
-    def holds(self, q: Array) -> bool:
-        """Return whether motors and prescribed motions hold all degrees of freedom in a rigid pose (n,)."""
-        free, joints = self._free(q), [*self._joint.values(), *self._drives]
+    def holds(self, q: Array, mode: str = "") -> bool:
+        """Return whether motors of a mode and prescribed motions hold all degrees of freedom in a rigid pose (n,)."""
+        free, joints = self._free(q), self._held(mode)
         return _rank(self._scaled(joint_rows(self._rigid, joints, q)) @ free) == free.shape[1]
 
     def quick(self, q: Array, mode: str) -> dict[str, Any]:
@@ -136,10 +139,10 @@ class Seeing:
     def full(self, q: Array, mode: str) -> dict[str, Any]:
         """Return all numbers of a rigid pose (n,): those of `quick`, frequencies, compliance, chips and the path.
 
-        `held` and `unheld` are the lowest natural frequencies with all motors held, and free [Hz]; `compliance` of the
-        end-effector with motors held has semi-axes `sizes` [m/N] and the direction `angle` of the larger [rad];
-        `chips` have name, motors, number of freedoms driven, and what is lacking; `path` is that of `reach`, None if it
-        has not been asked for, and `path_name` its name.
+        `held` and `unheld` are the lowest natural frequencies with the motors of the mode held, and with all motors
+        free [Hz]; `compliance` of the end-effector, with the motors of the mode held, has semi-axes `sizes` [m/N] and
+        the direction `angle` of the larger [rad]; `chips` have name, motors, number of freedoms driven, and what is
+        lacking; `path` is that of `reach`, None if it has not been asked for, and `path_name` its name.
         """
         found = self.quick(q, mode)
         why, massless = found["why"], self.massless
@@ -149,14 +152,14 @@ class Seeing:
             return {**found, "why": {**why, "held": massless, "compliance": massless}}
         try:
             state = undeformed(self._flexible, self._rigid, State(0.0, q, np.zeros(self._rigid.n)))
-            held = list(dict.fromkeys([*self._joint.values(), *self._drives]))
+            held = self._held(mode)
             at = pose_matrices(self._flexible, state, held)
             if varying := [one.name for one in self._mechanism.loads if one.profiles]:
                 why["loads"] = f"frequencies and compliance leave out loads that vary in time: {listed(varying)}"
             found["held"] = self._frequencies(state, at, held) if held else None
             free = len(held) > len(self._drives) or not held
             found["unheld"] = self._frequencies(state, at, self._drives) if free else None
-            found["compliance"] = self._compliance(q, state, at, held, why)
+            found["compliance"] = self._compliance(q, state, at, mode, why)
         except (InputError, NumericalError) as error:
             why["held"] = str(error)
         return found
@@ -166,22 +169,26 @@ class Seeing:
         return [float(omega) / (2.0 * np.pi) for omega in found.frequencies if omega > 0.0][:_SHOWN]
 
     def _compliance(
-        self, q: Array, state: State, at: PoseMatrices, held: list[str], why: dict[str, str]
+        self, q: Array, state: State, at: PoseMatrices, mode: str, why: dict[str, str]
     ) -> dict[str, Any] | None:
         rows = self._task(self._flexible, state.q, place=True)
         if rows is None or not self._flexible.n_flexible:
             why["compliance"] = "no end-effector" if rows is None else "no flexible link"
             return None
-        if not self.holds(q):
-            why["compliance"] = "the motors do not hold the mechanism"
+        if not self.holds(q, mode):
+            why["compliance"] = "these motors do not hold the mechanism"
             return None
-        found = compliance(self._flexible, state, at, held, rows)
+        found = compliance(self._flexible, state, at, self._held(mode), rows)
         sizes, axes = np.linalg.eigh(0.5 * (found + found.T))
         return {"sizes": [float(sizes[1]), float(sizes[0])], "angle": float(np.arctan2(axes[1, 1], axes[0, 1]) % np.pi)}
 
     def _motors(self, mode: str) -> tuple[str, ...]:
         chosen = [one.motors for one in self._mechanism.modes if one.name == mode]
         return chosen[0] if chosen else tuple(motor.name for motor in self._mechanism.motors)
+
+    def _held(self, mode: str) -> list[str]:
+        """Return the joints that the motors of a mode and prescribed motions hold."""
+        return list(dict.fromkeys([*(self._joint[name] for name in self._motors(mode)), *self._drives]))
 
     def _free(self, q: Array) -> Array:
         """Return a basis (n, freedoms) of the motions that the joints allow, dimensionless and of unit length."""

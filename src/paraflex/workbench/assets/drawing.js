@@ -129,6 +129,8 @@ export class Drawing {
 
   // A block on a rail; on a point that lies on another link a slot along that link.
   addSlider(place, direction) {
+    const slides = this.places.jointsAt(place.at).some((one) => this.sheet.shown.joints.some(([name, kind]) => name === one && kind === "prismatic"));
+    if (slides) { this.bench.say("There is a slider already; its direction is among its properties.", "error"); return; }
     const here = this.places.refsAt(place.at), below = place.ref && !direction && this.sheet.hitBody(...place.px, here.map((one) => one.split(".")[0]));
     const guide = below && this.sheet.shown.points.find(([one, x, y]) => one.startsWith(`${below.name}.`) && Math.hypot(x - place.at[0], y - place.at[1]) > 1e-9);
     if (guide) { this.bench.act({ kind: "add-joint", type: "slot", a: guide[0], b: place.ref }); return; }

@@ -50,7 +50,7 @@ export class Pulling {
   down([px, py], event) {
     this.clear();
     const near = (this.bench.state.picture?.points ?? []).filter(([ref]) => !ref.startsWith("ground.")).map(([ref, x, y]) => [ref, [x, y], Math.hypot(...[0, 1].map((axis) => this.sheet.px(x, y)[axis] - [px, py][axis]))]).sort((a, b) => a[2] - b[2])[0];
-    if (!near || near[2] > 18) { this.text.textContent = "There is no point of a link: press at one and pull."; return; }
+    if (!near || near[2] > 18) { this.text.textContent = "There is no point of a link: press at one and pull; Further point (O) adds one."; return; }
     this.sheet.canvas.setPointerCapture(event.pointerId);
     this.held = true;
     this.begin(near[0], near[1]);
@@ -139,7 +139,7 @@ export function linearCharts(bench, found) {
     charts.push({ ...base, identity: "phase", title: "Phase", x: "frequency [Hz]", y: ["phase [°]"], log_x: true, curves: curves("phase") });
   }
   const page = { rows, runs: [""], abscissae: [], time: -1 }, clock = { time: 0, index: 0, over: 0, seek() {} };
-  const note = [found.held.length ? `Frequencies with all motors held: ${found.held.map((one) => shortNumber(one, 3)).join(", ")} Hz.` : "", found.unbalanced > 1e-6 ? `The mechanism does not rest here: it would start with ${quantity(found.unbalanced, "m/s^2")}.` : ""].filter(Boolean).join(" ");
+  const note = [found.held.length ? `Frequencies with these motors held: ${found.held.map((one) => shortNumber(one, 3)).join(", ")} Hz.` : "", found.unbalanced > 1e-6 ? `The mechanism does not rest here: it would start with ${quantity(found.unbalanced, "m/s^2")}.` : ""].filter(Boolean).join(" ");
   const table = { title: "Poles", heads: [["real part", "1/s"], ["imaginary part", "rad/s"], ["frequency", "Hz"], ["damping ratio", ""]], rows: found.poles.slice(0, 12).map((pole) => pole.map((one) => shortNumber(one ?? NaN))), note };
   return { charts: charts.map((one) => new Chart(bench, clock, one, page)), table };
 }

@@ -31,11 +31,11 @@ export class Seeing {
     const why = seen.why ?? {}, { old } = this;
     this.given = new Set();
     this.put("freedoms", "Degrees of freedom", freedomsText(seen, this.bench.state.picture?.joints.some((one) => one[4])), why.freedoms);
-    this.put("condition", "Condition number", seen.condition === null || seen.condition === undefined ? "" : shortNumber(seen.condition, 3), seen.freedoms ? why.condition ?? "no task that these motors drive" : "", false, "Largest by smallest effort in the task per torque of these motors; 1 is best");
+    this.put("condition", "Condition number", seen.condition === null || seen.condition === undefined ? "" : shortNumber(seen.condition, 3), seen.freedoms ? why.condition : "", false, "Largest by smallest effort in the task per torque of these motors; 1 is best");
     this.bars(seen);
-    this.put("held", "Frequencies, all motors held", frequencies(seen.held), why.held, old, "Lowest natural frequencies with all motors held");
-    this.put("unheld", "Frequencies, motors free", frequencies(seen.unheld), why.unheld ?? why.held, old, "Lowest natural frequencies with free motors");
-    this.put("compliance", "Compliance, all held", seen.compliance ? `${quantity(seen.compliance.sizes[0], "m/N")}, ${quantity(seen.compliance.sizes[1], "m/N")}` : "", why.compliance ?? why.held, old, "Semi-axes of the ellipse: displacements of the end-effector by a force of 1 N with motors held");
+    this.put("held", "Frequencies, held", frequencies(seen.held), why.held, old, "Lowest natural frequencies with the motors of this mode held");
+    this.put("unheld", "Frequencies, free", frequencies(seen.unheld), why.unheld ?? why.held, old, "Lowest natural frequencies with free motors");
+    this.put("compliance", "Compliance, held", seen.compliance ? `${quantity(seen.compliance.sizes[0], "m/N")}, ${quantity(seen.compliance.sizes[1], "m/N")}` : "", why.compliance ?? why.held, old, "Semi-axes of the ellipse: displacements of the end-effector by a force of 1 N with the motors of this mode held");
     this.put("loads", "Left out", "", why.loads, old);
     this.put("torques", "Holding torques", seen.torques ? Object.entries(seen.torques).map(([motor, value]) => `${motor} ${quantity(value, this.unitOf(motor)) || "–"}`).join(", ") || "no motors" : "", why.torques, false, "Torques of these motors that hold gravity, springs and loads");
     this.showChips(seen);

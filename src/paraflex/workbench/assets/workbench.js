@@ -271,7 +271,7 @@ class Workbench {
     await this.text.flush();
     if (name === undefined && !this.state.file) return this.askName();
     const found = await this.request("save", name === undefined ? {} : { name });
-    if (found && !found.note) this.say(`Saved as ${this.state.file}`);
+    if (found && !found.note) this.say(`Saved as ${this.state.file}${this.state.problem ? "; it is not a model yet" : ""}`);
     return null;
   }
 
