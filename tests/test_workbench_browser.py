@@ -350,6 +350,22 @@ def middle_of(person: Person, body: str) -> tuple[float, float]:
     return x0 + 0.4 * (x1 - x0), y0 + 0.4 * (y1 - y0)
 
 
+def test_a_field_follows_many_steps_and_their_undoing(at_work):
+    person = at_work("five_bar")
+    field = person.page.get_by_label("l1", exact=True).first
+    field.focus()
+    for text in ("0.2", "0.21", "0.22", "0.23"):
+        person.page.keyboard.press("Control+a")
+        person.page.keyboard.type(text)
+        person.page.keyboard.press("Enter")
+    person.until("workbench.state.text.includes('l1 = 0.23')")
+    for _ in range(4):
+        person.page.keyboard.press("Control+z")
+    person.until("!workbench.state.undo")
+    assert person.state["text"] == library_text("five_bar")
+    expect(field).to_have_value("0.250")
+
+
 def test_a_slider_of_a_parameter_is_one_step(at_work):
     person = at_work("five_bar")
     slider = person.page.get_by_label("l1 slider")

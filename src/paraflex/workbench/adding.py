@@ -48,12 +48,15 @@ def add_mode(sheet: Sheet, action: Action) -> Done:
 
 def add_drive(sheet: Sheet, action: Action) -> Done:
     """Add a motion of constant speed at a joint; a model without a path runs for one turn by default."""
-    joint, speed = _undriven(sheet, action), float(action.get("speed") or 2.0 * pi)
+    joint, given, duration = _undriven(sheet, action), action.get("speed"), 1.0
+    # A speed in its unit is a whole turn in the duration, to the last digit.
+    speed = float(given) if given else ("100 mm/s" if _slides(sheet, joint) else "60 rpm")
+    if given and not _slides(sheet, joint):
+        duration = abs(2.0 * pi / float(given))
     name = sheet.free_name(action, "prescribed", "drive")
     sheet = sheet.table(("prescribed", name), {"joint": joint, "speed": speed})
-    study = sheet.data.get("study", {})
-    if not study.keys() & {"duration", "path", "paths"}:
-        sheet = sheet.put(("study", "duration"), abs(2.0 * pi / speed) if not _slides(sheet, joint) else 1.0)
+    if not sheet.data.get("study", {}).keys() & {"duration", "path", "paths"}:
+        sheet = sheet.put(("study", "duration"), duration)
     return sheet, f"prescribed.{name}"
 
 

@@ -164,17 +164,23 @@ class Row {
   update(field) {
     const changed = field.text !== this.field?.text;
     this.field = field;
-    if (changed && (!this.isTyped || this.sent === this.input.value)) { this.input.value = field.text ?? ""; this.setWrong(""); }
+    if (changed && !this.isTyped) { this.input.value = this.known = field.text ?? ""; this.setWrong(""); }
     const evaluated = typeof field.value === "number" && !PLAIN.test(String(field.text ?? "").trim());
     this.value.textContent = evaluated ? `= ${quantity(field.value, field.unit ?? "", 6)}` : "";
     if (this.range && document.activeElement !== this.range && Number.isFinite(field.value)) this.range.value = field.value;
   }
 
-  get isTyped() { return document.activeElement === this.input && this.input.value !== this.before; }
+  // Whether a person is typing a text that was neither sent nor given.
+  get isTyped() { return document.activeElement === this.input && this.input.value !== this.known; }
 
   key(event) {
-    this.before ??= this.field.text;
+    const letter = event.key.toLowerCase();
     if (event.key === "Enter") this.commit();
+    if ((event.ctrlKey || event.metaKey) && "zy".includes(letter) && !this.isTyped) {
+      this.bench.step(letter === "y" || event.shiftKey ? "redo" : "undo");
+      event.preventDefault();
+      event.stopPropagation();
+    }
     if (event.key === "Escape") { this.input.value = this.field.text ?? ""; this.setWrong(""); this.bench.sheet.canvas.focus(); event.stopPropagation(); }
   }
 
@@ -183,6 +189,7 @@ class Row {
     if (text === this.field.text && this.wrong.hidden) return;
     if (text === this.sent && this.pending) return;
     this.sent = text;
+    this.known = this.input.value;
     this.pending = true;
     try {
       const action = text || !this.field.optional ? { kind: "set", place, text } : { kind: "unset", place };
