@@ -7,6 +7,7 @@ import re
 import time
 import tomllib
 from collections.abc import Callable
+from contextlib import ExitStack
 from itertools import combinations
 from pathlib import Path
 
@@ -18,7 +19,7 @@ from paraflex.files import library_text
 from paraflex.files.model import model_of_text
 from paraflex.workbench.document import EMPTY
 from paraflex.workbench.readiness import checked
-from workbenches import served
+from workbenches import hosted
 
 expect.set_options(timeout=30_000)
 
@@ -107,15 +108,15 @@ class Person:
 
 
 @pytest.fixture
-def at_work(browser, tmp_path):
+def at_work(browser, tmp_path, monkeypatch):
     """Open a workbench; its console must be silent in the end."""
-    complaints, ends = [], []
+    complaints, ends = [], ExitStack()
+    monkeypatch.chdir(tmp_path)
 
-    def open_page(source: str = "", viewport: dict[str, int] = DESKTOP, **settings) -> Person:
-        running = served(*([source] if source else []), folder=tmp_path)
-        _, address = running.__enter__()
+    def open_page(source: str | None = None, viewport: dict[str, int] = DESKTOP, **settings) -> Person:
+        _, address = ends.enter_context(hosted(source, folder=tmp_path))
         context = browser.new_context(viewport=viewport, **settings)
-        ends.extend((lambda: running.__exit__(None, None, None), context.close))
+        ends.callback(context.close)
         page = context.new_page()
         page.on("console", lambda message: complaints.append(message.text) if is_ours(message.text) else None)
         page.on("pageerror", lambda error: complaints.append(str(error)))
@@ -130,9 +131,8 @@ def at_work(browser, tmp_path):
         person.until("window.workbench?.state.revision >= 0 && workbench.sheet.frames > 0")
         return person
 
-    yield open_page
-    for end in reversed(ends):
-        end()
+    with ends:
+        yield open_page
     assert complaints == []
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import re
 import sys
+import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -12,6 +13,8 @@ from typing import Any
 
 from websockets.sync.client import ClientConnection, connect
 
+from paraflex.workbench.document import Document
+from paraflex.workbench.host import Host
 from processes import Child, started
 
 
@@ -22,6 +25,19 @@ def served(*arguments: str, folder: Path, **environment: str) -> Iterator[tuple[
     with started(sys.executable, "-m", "paraflex", "edit", *arguments, "--no-open", cwd=folder, env=env) as child:
         child.until(lambda: "Ctrl-C" in child.out)
         yield child, re.search(r"http://\S+/", child.out)[0]  # type: ignore[index]
+
+
+@contextmanager
+def hosted(source: str | None = None, *, folder: Path) -> Iterator[tuple[Host, str]]:
+    """A server as `paraflex edit` has it, in a thread: processes spend most of their time on imports."""
+    host = Host(Document(source, drafts=folder / "drafts"))
+    thread = threading.Thread(target=host.serve)
+    thread.start()
+    try:
+        yield host, host.address
+    finally:
+        host.end()
+        thread.join()
 
 
 class Talk:
