@@ -29,8 +29,8 @@ def served(*arguments: str, folder: Path, **environment: str) -> Iterator[tuple[
 
 @contextmanager
 def hosted(source: str | None = None, *, folder: Path) -> Iterator[tuple[Host, str]]:
-    """A server as `paraflex edit` has it, in a thread: processes spend most of their time on imports."""
-    host = Host(Document(source, drafts=folder / "drafts"))
+    """A server as `paraflex edit` has it, with the same drafts, in a thread: a process would first import all again."""
+    host = Host(Document(source, drafts=folder / "state" / "paraflex" / "drafts"))
     thread = threading.Thread(target=host.serve)
     thread.start()
     try:
