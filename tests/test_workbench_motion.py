@@ -13,7 +13,9 @@ import test_workbench_browser as browsing
 from paraflex.figures.kinematics import kinematics_of
 from paraflex.files import library_text
 from paraflex.results.following import headline
+from paraflex.workbench import session
 from paraflex.workbench.computing import computed, model_of
+from paraflex.workbench.runs import Runner
 from test_workbench_browser import Person
 
 at_work = browsing.at_work
@@ -52,6 +54,19 @@ WITHOUT_AXES = r"""() => workbench.motion.charts.filter((chart) => {
     const hasUnits = unit(chart.label) && unit(chart.over?.label ?? chart.description.x);
     return !hasUnits || chart.yTicks.length < 2 || chart.xTicks.length < 2;
 }).map((chart) => chart.description.title)"""
+
+
+@pytest.fixture(scope="module")
+def runner():
+    with Runner(spare=False) as made:
+        yield made
+
+
+@pytest.fixture
+def warm(runner, monkeypatch):
+    """Let all sessions use one process for runs, which is warm after the first."""
+    monkeypatch.setattr(runner, "close", runner.cancel)
+    monkeypatch.setattr(session, "Runner", lambda: runner)
 
 
 def run(person: Person) -> None:
@@ -143,7 +158,7 @@ def test_a_turn_shows_the_coupler_curve_with_its_values(at_work, tmp_path):
     expect(person.page.locator(".drawer")).to_contain_text("crunode")
 
 
-def test_a_run_is_played_with_its_numbers(at_work):
+def test_a_run_is_played_with_its_numbers(at_work, warm):
     person = at_work("five_bar")
     run(person)
     found = computed(model_of(library_text("five_bar"))).begun().result.data
@@ -174,7 +189,7 @@ def test_a_run_is_played_with_its_numbers(at_work):
     assert person.page.evaluate("workbench.sheet.picture") is None
 
 
-def test_a_change_runs_again_beside_the_run_before(at_work):
+def test_a_change_runs_again_beside_the_run_before(at_work, warm):
     person = at_work("five_bar")
     run(person)
     person.page.get_by_role("button", name="Charts").click()

@@ -1,6 +1,8 @@
 """The model of the text as far as it can be read, the pose that a person has moved it to, and the picture of both."""
 
+from collections.abc import Mapping
 from dataclasses import replace
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -229,8 +231,10 @@ class Bench:
 
 def library(names: list[str]) -> list[dict[str, Any]]:
     """Return names, descriptions and sketches of library mechanisms."""
-    found = []
-    for name in names:
-        mechanism = model_of_text(library_text(name), name, Path()).mechanism
-        found.append({"name": name, "title": mechanism.name, "about": mechanism.description, "svg": sketch(mechanism)})
-    return found
+    return [dict(_card(name)) for name in names]
+
+
+@cache
+def _card(name: str) -> Mapping[str, Any]:
+    mechanism = model_of_text(library_text(name), name, Path()).mechanism
+    return {"name": name, "title": mechanism.name, "about": mechanism.description, "svg": sketch(mechanism)}
