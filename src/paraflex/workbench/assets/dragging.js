@@ -32,7 +32,7 @@ export class Dragging {
     this.drag = new Newest(bench, "drag", (found) => this.dragged(found));
     this.badge = element("span", { class: "badge", hidden: true });
     this.posed = element("div", { class: "posed", hidden: true }, element("small", {}, "Runs begin in the pose of the file."),
-      button("Keep this pose", "The dragged pose becomes the assembly of the file", () => bench.request("pose"), { class: "main" }),
+      button("Keep this pose", "The dragged pose becomes the assembly of the file, in which runs begin", () => bench.request("pose"), { class: "main" }),
       button("Back", "The assembly of the file again", () => this.back()));
     bench.parts.stage.append(this.badge, this.posed);
     bench.on("state", () => { this.posed.hidden = !bench.state.moved; });
