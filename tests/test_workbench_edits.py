@@ -678,3 +678,16 @@ def test_several_points_move_by_the_same_step():
     before, after = drawn_places(text), drawn_places(moved)
     for ref in ("ground.O", "crank.O", "crank.A", "coupler.A"):
         assert after[ref] == pytest.approx((before[ref][0], before[ref][1] + 0.01), abs=1e-6), ref
+
+
+def test_a_damper_between_points_is_a_spring_without_stiffness():
+    text = library_file("four_bar").read_text(encoding="utf-8")
+    edited = apply(text, {"kind": "add-damper", "points": ["crank.A", "ground.Q"]})
+    assert edited.selected == "linear_spring.damper1"
+    (made,) = Sheet(edited.text).model.mechanism.linear_springs
+    assert (made.stiffness, made.damping, str(made.a), str(made.b)) == (0.0, 10.0, "crank.A", "ground.Q")
+
+
+def test_a_sensor_on_a_rigid_link_needs_a_point():
+    with pytest.raises(InputError, match=r"sensor: a rigid link has no strain .*crank.*Further point"):
+        apply(library_file("four_bar").read_text(encoding="utf-8"), {"kind": "add-sensor", "body": "crank"})

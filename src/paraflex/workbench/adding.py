@@ -79,7 +79,10 @@ def add_spring(sheet: Sheet, action: Action) -> Done:
 
 
 def add_damper(sheet: Sheet, action: Action) -> Done:
-    """Add a damper at a joint."""
+    """Add a damper at a joint, or between two points: a linear spring without stiffness."""
+    if "points" in action:
+        table = {"points": list(action["points"]), "damping": float(action.get("damping", 10.0))}
+        return _member(sheet, action, "linear_spring", table, "damper")
     return _member(
         sheet, action, "damper", {"joint": action.get("joint"), "coefficient": action.get("coefficient", 0.1)}
     )
@@ -110,7 +113,11 @@ def add_sensor(sheet: Sheet, action: Action) -> Done:
         table = {"type": action.get("type", "encoder"), "joint": action["joint"]}
         table |= {"axis": action.get("axis", "x")} if table["type"] == "joint_force" else {}
     elif "body" in action:
-        length = sheet.number(("body", _known(sheet, action, "body"), "length"))
+        body = _known(sheet, action, "body")
+        if "length" not in sheet.data["body"][body]:
+            remedy = "click on a point of it: Further point (O) adds one"
+            raise InputError("a rigid link has no strain", field="sensor", value=body, remedy=remedy)
+        length = sheet.number(("body", body, "length"))
         table = {"type": "strain", "body": action["body"], "at": action.get("at", length / 2.0)}
     else:
         table = {"type": action.get("type", "position"), "point": action.get("at"), "axis": action.get("axis", "x")}

@@ -20,7 +20,7 @@ const GROUPS = [
     ["drive", "Drive", "d", "pointer", "Click the joint of a crank: it turns at constant speed."],
     ["gear", "Gear", "k", "pointer", "Click one joint, then the one that turns with it."],
     ["spring", "Spring", "x", "pointer", "Click a joint, or drag from one point to another."],
-    ["damper", "Damper", "c", "pointer", "Click a joint."],
+    ["damper", "Damper", "c", "pointer", "Click a joint, or two points."],
     ["load", "Force", "f", "crosshair", "Press at a point of a link and drag the force; a click: 10 N downwards."],
     ["lump", "Lumped mass", "u", "pointer", "Click a point of a flexible link."]],
   [["sensor", "Sensor", "n", "pointer", "Click a joint (its angle), a point (its position) or a flexible link (its strain)."],
