@@ -130,6 +130,10 @@ class Hand:
                 lambda: {"kind": "add-spring", "joint": joint, "stiffness": 2.0},
                 lambda: {"kind": "add-spring", "points": [self.ref(data), self.ref(data)]},
                 lambda: {"kind": "add-damper", "joint": joint},
+                lambda: {"kind": "add-damper", "points": [self.ref(data), self.ref(data)]},
+                lambda: {"kind": "retype", "joint": joint, "type": choose(["weld", "prismatic", "slot", "revolute"])},
+                lambda: {"kind": "move", "names": [f"body.{one}" for one in data["body"]], "by": [0.01, -0.02]},
+                lambda: {"kind": "move", "names": [self.ref(data), self.ref(data)], "by": [0.0, 0.03]},
                 lambda: {"kind": "add-gear", "joints": [joint, self.name(data, "joint")[1]], "ratio": -2},
                 lambda: {
                     "kind": "add-load",
@@ -289,6 +293,8 @@ def test_messages_of_nonsense_are_refused_in_one_line():
         "add-ground",
         "add-link",
         "add-joint",
+        "retype",
+        "move",
         "add-slider",
         "add-point",
         "add-motor",
@@ -691,3 +697,30 @@ def test_a_damper_between_points_is_a_spring_without_stiffness():
 def test_a_sensor_on_a_rigid_link_needs_a_point():
     with pytest.raises(InputError, match=r"sensor: a rigid link has no strain .*crank.*Further point"):
         apply(library_file("four_bar").read_text(encoding="utf-8"), {"kind": "add-sensor", "body": "crank"})
+
+
+def test_a_joint_of_another_type_keeps_its_motor_if_it_moves():
+    text = library_file("five_bar").read_text(encoding="utf-8")
+    sliding = apply(text, {"kind": "retype", "joint": "A1", "type": "prismatic"})
+    assert sliding.note == ""
+    assert Sheet(sliding.text).data["motor"] == Sheet(text).data["motor"]
+    welded = apply(text, {"kind": "retype", "joint": "A1", "type": "weld"})
+    assert welded.note == "also deleted: motor.left, mode.++"
+    for edited, kind in ((sliding, "prismatic"), (welded, "weld")):
+        joint = next(one for one in Sheet(edited.text).joints if one.name == "A1")
+        assert (joint.kind, str(joint.a), str(joint.b)) == (kind, "ground.A1", "proximal1.A1")
+
+
+def test_links_of_an_open_chain_are_welded():
+    text = EMPTY
+    for action in (
+        {"kind": "add-ground", "at": [0.0, 0.0], "name": "A"},
+        {"kind": "add-link", "points": ["ground.A", [0.2, 0.1]]},
+        {"kind": "add-link", "points": ["link1.B", [0.4, 0.0]]},
+    ):
+        text = apply(text, action).text
+    welded = Sheet(apply(text, {"kind": "retype", "joint": "B", "type": "weld"}).text)
+    before = Sheet(text)
+    assert [one.kind for one in welded.joints] == ["revolute", "weld"]
+    for ref in before.refs:
+        assert welded.place(ref, welded.shown) == pytest.approx(before.place(ref, before.shown), abs=1e-5)

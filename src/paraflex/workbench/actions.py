@@ -63,7 +63,7 @@ def apply(text: str, action: Mapping[str, Any], folder: Path | None = None) -> E
             known(action["assembly"], before.names("assembly"), "assembly", "assembly")
         after, selected = _ACTIONS[action["kind"]](before, action)
         _check(before, after, action)
-    return Edited(after.text, selected, _note(before, action))
+    return Edited(after.text, selected, _note(before, after, action))
 
 
 def what_goes(text: str, names: Sequence[Any]) -> list[dict[str, Any]]:
@@ -94,8 +94,13 @@ def _check(before: Sheet, after: Sheet, action: Mapping[str, Any]) -> None:
         raise after.problem
 
 
-def _note(before: Sheet, action: Mapping[str, Any]) -> str:
-    if action["kind"] != "delete":
-        return ""
-    gone = [one["name"] for one in what_goes(before.text, action.get("names", ()))]
+def _note(before: Sheet, after: Sheet, action: Mapping[str, Any]) -> str:
+    gone = []
+    if action["kind"] == "delete":
+        gone = [one["name"] for one in what_goes(before.text, action.get("names", ()))]
+    if action["kind"] == "retype":
+        lost = [
+            (table, name) for table in before.data for name in before.names(table) if name not in after.names(table)
+        ]
+        gone = [f"{table}.{name}" for table, name in lost if table not in ("assembly", "study")]
     return f"also deleted: {', '.join(gone)}" if gone else ""

@@ -11,12 +11,16 @@ from paraflex.expressions.evaluate import names_in
 from paraflex.files.fields import Place, field_at, value_at
 from paraflex.files.overlay import value_of
 from paraflex.files.schema import ModelTable
+from paraflex.mechanism import JOINT_KINDS
 from paraflex.mechanism.joints import GROUND
 from paraflex.mechanism.poses import Pose
+from paraflex.mechanism.quantities import known
 from .dependents import Use, falling, replaced, spelt, thing_of, uses
 from .edits import number_text, renamed, with_value, written
+from .linking import fields_of
 from .moving_points import joined_to, move_point, with_number, with_starts
-from .sheet import XY, Action, Done, Sheet, check_name, near, placed, tidy
+from .sheet import XY, Action, Done, Sheet, check_name, near, placed, tidy, without_spare_places
+from .spans import entries_of
 
 # Length by which the inertia of a block is that of a rod [m].
 _BLOCK = 0.05
@@ -128,17 +132,47 @@ def rename(sheet: Sheet, action: Action) -> Done:
     return after, spelt((*thing[:-1], str(to)))
 
 
+def retype(sheet: Sheet, action: Action) -> Done:
+    """Make a joint one of another type; what drives or loads it stays, if the joint still moves in that way."""
+    name, kind = str(action.get("joint")), str(action.get("type"))
+    known(kind, list(JOINT_KINDS), "type", "kind of joint")
+    joint = next((one for one in sheet.joints if one.name == name), None)
+    if joint is None:
+        raise sheet.problem or InputError("no such joint", field="joint", value=name, remedy="choose a joint")
+    a, b, thing = str(joint.a), str(joint.b), ("joint", name)
+    table, old = {"type": kind, "points": [a, b]}, value_at(sheet.data, thing)
+    table |= fields_of(sheet, action, JOINT_KINDS[kind], a, b)
+    after = sheet
+    if isinstance(old, list):
+        after = sheet.put(thing, [a, b] if kind == "revolute" else table)
+    else:
+        for key in [key for key in old if key not in table]:
+            after = after.without((*thing, key))
+        for key in [key for key in table if table[key] != old.get(key)]:
+            after = after.put((*thing, key), table[key])
+    if after.problem is not None:
+        users = {use.place[:2] for use in uses(after.data) if replaced(use, thing, "") is not None} - {thing}
+        after = _without(after, list(users)) if users else after
+    bodies = {joint.a.body, joint.b.body}
+    return placed(sheet, without_spare_places(after, bodies)), spelt(thing)
+
+
 def delete(sheet: Sheet, action: Action) -> Done:
     """Delete members together with what depends on them."""
     things = [thing_of(sheet.data, name) for name in action.get("names") or ()]
     if not things:
         raise InputError("nothing to delete", field="names", value=action.get("names"), remedy="choose something")
+    return placed(sheet, _without(sheet, things)), ""
+
+
+def _without(sheet: Sheet, things: Sequence[Place]) -> Sheet:
+    """Remove members, and what depends on them."""
     after, gone = sheet, falling(sheet.data, things)
     whole = [place for place in gone if not any(place[: len(each)] == each for each in gone if each != place)]
     # Items of a list go from its end, as their indices count from its start.
     for place in sorted(whole, key=lambda each: [part for part in each if isinstance(part, int)], reverse=True):
         after = after.without(place)
-    return placed(sheet, after), ""
+    return after
 
 
 def pose(sheet: Sheet, action: Action) -> Done:
@@ -158,11 +192,11 @@ def pose(sheet: Sheet, action: Action) -> Done:
         points = {ref: place for ref, place in points.items() if ref in given.get("points", {})}
     for ref, place in points.items():
         sheet = sheet.put(("assembly", name, "points", ref), [float(each) for each in place])
-    known = before.frames(name) if name == before.shown else {}
+    frames = before.frames(name) if name == before.shown else {}
     turns = {
-        body: near(float(angle), known[body].angle) - known[body].angle
+        body: near(float(angle), frames[body].angle) - frames[body].angle
         for body, angle in angles.items()
-        if body in known
+        if body in frames
     }
     return with_starts(sheet, turns, action.get("travels") or {}), f"assembly.{name}"
 
@@ -208,7 +242,18 @@ def moved(sheet: Sheet, action: Action) -> Done:
             x, y = before.place(ref, before.shown)
             sheet, _ = move_point(sheet, {"ref": ref, "to": [x + by[0], y + by[1]]})
             done.update(joined_to(before, ref))
-    return sheet, spelt(things[-1])
+    return _as_written(before, sheet), spelt(things[-1])
+
+
+def _as_written(before: Sheet, after: Sheet) -> Sheet:
+    """Write values that have changed and come back as they were written."""
+    written_now = {one.place: after.text[slice(*one.value)] for one in entries_of(after.text) if one.kind == "pair"}
+    for one in entries_of(before.text):
+        text = before.text[slice(*one.value)]
+        differs = one.kind == "pair" and written_now.get(one.place, text) != text
+        if differs and value_at(before.data, one.place) == value_at(after.data, one.place):
+            after = after.with_text(with_value(after.text, one.place, text))
+    return after
 
 
 def _check_whole(sheet: Sheet, bodies: Collection[str], grounds: Collection[str]) -> None:
@@ -262,10 +307,10 @@ def _doubled(sheet: Sheet, action: Action, image: Callable[[Pose], Pose], *, mir
             if at is not None and at.position is not None:
                 frames[assembly][new] = image(at)
                 sheet = sheet.put(("assembly", assembly, new), near(image(at).angle, 0.0))
-    known = [use for use in uses(before.data) if use.kind in ("ref", "joint", "body", "own")]
+    named_by = [use for use in uses(before.data) if use.kind in ("ref", "joint", "body", "own")]
     for table in _COPIED:
         for name, member in before.data.get(table, {}).items():
-            own = [use for use in known if use.place[:2] == (table, name)]
+            own = [use for use in named_by if use.place[:2] == (table, name)]
             sheet = _with_copy(sheet, (table, name), member, own, names, mirrored=mirrored)
     selected = ("body", bodies[-1]) if bodies else named[-1]
     return placed(before, sheet, frames), f"{selected[0]}.{names[selected]}"
@@ -367,5 +412,5 @@ def _value(sheet: Sheet, use: Use) -> list[float]:
 
 CHANGING: dict[str, Callable[[Sheet, Action], Done]] = {
     "set": set_value, "unset": unset, "rename": rename, "copy": copied, "mirror": mirrored, "delete": delete,
-    "move": moved, "pose": pose,
+    "move": moved, "pose": pose, "retype": retype,
 }  # fmt: skip

@@ -53,7 +53,7 @@ def add_joint(sheet: Sheet, action: Action) -> Done:
     known(kind, list(JOINT_KINDS), "type", "kind of joint")
     if b.startswith(f"{GROUND}."):
         a, b = b, a
-    fields = _fields_of(sheet, action, JOINT_KINDS[kind], a, b)
+    fields = fields_of(sheet, action, JOINT_KINDS[kind], a, b)
     name = sheet.free_name(action, "joint", "joint") if action.get("name") else _joint_name(sheet, b)
     if kind == "revolute":
         sheet = sheet.put(("joint", name), [a, b])
@@ -103,7 +103,7 @@ def add_point(sheet: Sheet, action: Action) -> Done:
     return sheet.put(("body", body, "points", name), local[0] if on_axis else tidy(local)), f"{body}.{name}"
 
 
-def _fields_of(sheet: Sheet, action: Action, kind: type[Joint], a: str, b: str) -> dict[str, float]:
+def fields_of(sheet: Sheet, action: Action, kind: type[Joint], a: str, b: str) -> dict[str, float]:
     """Return the directions of a joint as its points are in the picture, without those that are zero."""
     shown = action.get("assembly") or sheet.shown
     start, end = sheet.place(a, shown), sheet.place(b, shown)

@@ -109,7 +109,7 @@ export class Drawing {
     if (!place.ref) { this.missed("a point of a link or of the ground"); return; }
     const refs = this.places.refsAt(place.at), bodies = new Set(refs.map((one) => one.split(".")[0]));
     const [joint] = this.places.jointsAt(place.at);
-    if (!this.begun.length && joint && this.places.jointsAt(place.at).length >= bodies.size - 1) { this.convert(joint, type); return; }
+    if (!this.begun.length && joint && this.places.jointsAt(place.at).length >= bodies.size - 1) { this.bench.act({ kind: "retype", joint, type }); return; }
     if (!this.begun.length && bodies.size > 1 && this.places.jointsAt(place.at).length < bodies.size - 1) {
       this.bench.act({ kind: "add-joint", type, a: refs[0], b: refs.at(-1) });
       return;
@@ -118,13 +118,6 @@ export class Drawing {
     if (this.begun.length < 2) return;
     const [a, b] = this.begun.splice(0).map((one) => one.ref);
     this.bench.act({ kind: "add-joint", type, a, b });
-  }
-
-  // A joint between the same points of another type.
-  async convert(joint, type) {
-    const { fields } = await this.bench.link.ask("fields", { place: ["joint", joint] });
-    const [a, b] = fields.map(({ text }) => text).filter((text) => /^[^.\s]+\.[^.\s]+$/.test(text) && isNaN(text));
-    this.bench.actAll({ kind: "delete", names: [`joint.${joint}`] }, { kind: "add-joint", type, a, b, name: joint });
   }
 
   // A block on a rail; on a point that lies on another link a slot along that link.
