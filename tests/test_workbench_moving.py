@@ -133,13 +133,13 @@ def test_a_five_bar_stays_in_its_assembly_by_any_body():
         start, signs, random = mover.q.copy(), np.sign(sines(mover)), np.random.default_rng(5)
         home = place(mover, "distal1.C")
         for body in ("distal1", "proximal1", "distal2", "proximal2"):
-            for _ in range(4):
+            for _ in range(2):
                 mover.drag(body, (0.25, 0.0), random.normal(scale=0.5, size=2))
                 assert np.array_equal(np.sign(sines(mover)), signs)
                 assert gap(mover) < 1e-9
         mover.at(start)
         mover.drag("distal1", "C", home)
-        for _ in range(8):
+        for _ in range(4):
             mover.drag("distal1", "C", random.normal(scale=0.5, size=2))
         assert mover.drag("distal1", "C", home).reached
         assert turned(mover.q, start, mover.system) < 1e-6
@@ -214,13 +214,13 @@ def test_loops_stay_closed_and_branches_are_kept_along_random_paths(name):
     mover, random = mover_of(name), np.random.default_rng(3)
     start, size = mover.q.copy(), mover.system.size
     refs = [(body.name, point) for body in mover.mechanism.bodies for point in body.points]
-    for k in random.permutation(len(refs))[:3]:
+    for k in random.permutation(len(refs))[:2]:
         body, point = refs[k]
         mover.at(start)
         home = place(mover, f"{body}.{point}")
         mover.drag(body, point, home)
         guards = [guard for guard in mover._drag.dragging.guards if guard.sign]
-        for j in range(12):
+        for j in range(8):
             moved = mover.drag(body, point, home + random.normal(scale=(2.0, 0.1)[j % 2] * size, size=2))
             assert gap(mover) < 1e-9
             assert moved.stop in ("", "reach", "singular")

@@ -170,7 +170,8 @@ def test_a_process_that_does_not_stop_is_replaced(runner):
     assert active.wait(WITHIN) == -signal.SIGKILL
 
 
-def test_a_process_that_does_not_stop_is_replaced_without_a_spare_one():
+def test_a_process_that_does_not_stop_is_replaced_without_a_spare_one(monkeypatch):
+    monkeypatch.setattr("paraflex.workbench.runs._LONGEST", 0.8)
     with Runner(spare=False) as runner:
         assert finished(runner, FIVE_BAR)["state"] == "done"
         for text in (ENDLESS, FIVE_BAR):

@@ -259,7 +259,7 @@ class TestFreedoms:
         model, _ = read(library_text(name))
         mover, random = Mover(model.mechanism, model.study.assembly), np.random.default_rng(7)
         seen, body = Seeing(model), model.mechanism.bodies[-1]
-        for to in mover.system.size * random.normal(size=(12, 2)):
+        for to in mover.system.size * random.normal(size=(6, 2)):
             mover.drag(body.name, [0.0, 0.0], to.tolist())
             found = seen.full(mover.q, model.mechanism.modes[0].name if model.mechanism.modes else "")
             json.dumps(found, allow_nan=False)
