@@ -41,6 +41,9 @@ export class Fields {
     this.asking = null;
   }
 
+  // Whether an input has a text that was neither sent nor given.
+  isTyped(input) { return this.rows?.find((row) => row.input === input)?.isTyped ?? true; }
+
   // Rows stay while their fields do, so that nobody loses the place where they type.
   show(places, found) {
     const keys = JSON.stringify([places, found.map(({ fields, addable: more }) => [fields.map(({ place, choices }) => [place, choices]), (more ?? []).map(({ label }) => label)]), this.bench.selected]);
@@ -162,25 +165,19 @@ class Row {
   }
 
   update(field) {
-    const changed = field.text !== this.field?.text;
+    // Several steps may have passed since the last update; a text that was refused stays until the field changes.
+    const text = field.text ?? "", stale = this.wrong.hidden ? text !== this.input.value : text !== (this.field.text ?? "");
     this.field = field;
-    if (changed && !this.isTyped) { this.input.value = this.known = field.text ?? ""; this.setWrong(""); }
+    if (stale && !this.isTyped) { this.input.value = this.known = text; this.setWrong(""); }
     const evaluated = typeof field.value === "number" && !PLAIN.test(String(field.text ?? "").trim());
     this.value.textContent = evaluated ? `= ${quantity(field.value, field.unit ?? "", 6)}` : "";
     if (this.range && document.activeElement !== this.range && Number.isFinite(field.value)) this.range.value = field.value;
   }
 
-  // Whether a person is typing a text that was neither sent nor given.
   get isTyped() { return document.activeElement === this.input && this.input.value !== this.known; }
 
   key(event) {
-    const letter = event.key.toLowerCase();
     if (event.key === "Enter") this.commit();
-    if ((event.ctrlKey || event.metaKey) && "zy".includes(letter) && !this.isTyped) {
-      this.bench.step(letter === "y" || event.shiftKey ? "redo" : "undo");
-      event.preventDefault();
-      event.stopPropagation();
-    }
     if (event.key === "Escape") { this.input.value = this.field.text ?? ""; this.setWrong(""); this.bench.sheet.canvas.focus(); event.stopPropagation(); }
   }
 

@@ -339,7 +339,9 @@ class Workbench {
     if (control) {
       const letter = key.toLowerCase();
       const act = { z: () => this.step(event.shiftKey ? "redo" : "undo"), y: () => this.step("redo"), s: () => this.save(), d: () => this.copy() }[letter];
-      if (!act || (field && letter === "d") || (field && field !== this.text.area && letter !== "s")) return;
+      // What is being typed has a history of its own.
+      const typing = field && field !== this.text.area && this.fields.isTyped(field);
+      if (!act || (field && letter === "d") || (typing && letter !== "s")) return;
       event.preventDefault();
       act();
       return;
