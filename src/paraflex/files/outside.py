@@ -5,6 +5,7 @@ from contextlib import contextmanager
 from contextvars import ContextVar
 from pathlib import Path
 
+from paraflex.contexts import holding
 from paraflex.errors import InputError
 
 _allowed: ContextVar[bool] = ContextVar("allowed", default=False)
@@ -13,11 +14,8 @@ _allowed: ContextVar[bool] = ContextVar("allowed", default=False)
 @contextmanager
 def allowing_outside() -> Iterator[None]:
     """Allow models that are read inside the context to name tables outside their folders, as --allow-outside does."""
-    before = _allowed.set(True)
-    try:
+    with holding(_allowed, True):
         yield
-    finally:
-        _allowed.reset(before)
 
 
 def may_be_outside() -> bool:

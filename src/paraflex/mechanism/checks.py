@@ -6,6 +6,7 @@ from contextlib import contextmanager
 from contextvars import ContextVar
 from typing import Any
 
+from paraflex.contexts import holding
 from paraflex.errors import InputError, suggestion
 from .bodies import FlexibleBeam
 from .body_checks import check_body
@@ -138,11 +139,8 @@ def _check_suspended(mechanism: Members, assembly: Assembly) -> None:
 @contextmanager
 def loose_bodies() -> Iterator[None]:
     """Accept bodies that no joint connects with the ground, as a drawing has them before it is finished."""
-    token = _LOOSE.set(True)
-    try:
+    with holding(_LOOSE, True):
         yield
-    finally:
-        _LOOSE.reset(token)
 
 
 def check_connected(mechanism: Members) -> None:

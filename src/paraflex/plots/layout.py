@@ -17,6 +17,7 @@ from matplotlib.axis import Axis
 from matplotlib.figure import Figure
 
 from paraflex.arrays import NDArray
+from paraflex.contexts import holding
 from paraflex.figures.charts import TIME
 from paraflex.formatting import ROUNDING
 from paraflex.mechanism.quantities import known
@@ -58,11 +59,8 @@ def column_width(style: str | None) -> Iterator[None]:
     """Set the width of figures to one ("single") or two ("double") journal columns; None keeps their own width."""
     if style is not None:
         known(style, COLUMNS, "style", "style")
-    before = _width.set(None if style is None else COLUMNS[style])
-    try:
+    with holding(_width, None if style is None else COLUMNS[style]):
         yield
-    finally:
-        _width.reset(before)
 
 
 def page_width(width: float) -> float:

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from paraflex.arrays import ArrayLike, NDArray
+from paraflex.contexts import holding
 
 # 16-bit integers: the code of NaN, and the largest magnitude of other values.
 MISSING, _LARGEST_CODE = -32768, 32767
@@ -27,11 +28,8 @@ _LEVEL: ContextVar[int] = ContextVar("level of compression", default=_SMALL)
 @contextmanager
 def quickly() -> Iterator[None]:
     """Provide a context in which numbers are packed in less time and need more space."""
-    token = _LEVEL.set(_QUICK)
-    try:
+    with holding(_LEVEL, _QUICK):
         yield
-    finally:
-        _LEVEL.reset(token)
 
 
 @dataclass
