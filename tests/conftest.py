@@ -47,6 +47,28 @@ LONGEST = (
     "test_compilation", "test_workbench_motion", "test_workbench_host", "test_workbench_moving", "test_replacing",
     "test_verification", "test_kills", "test_fuzzing",
 )  # fmt: skip
+# A shaper: a crank drives a block that slides along an arm.
+QUICK_RETURN = """
+name = "quick return"
+[ground]
+O = [0, 0]
+Q = [0, "-150 mm"]
+[body.crank]
+points = { O = [0, 0], A = ["100 mm", 0] }
+[body.arm]
+points = { Q = [0, 0], P = ["450 mm", 0] }
+[body.block]
+points = { A = [0, 0] }
+[joint]
+O = ["ground.O", "crank.O"]
+A = ["crank.A", "block.A"]
+Q = ["ground.Q", "arm.Q"]
+S = { points = ["arm.Q", "block.A"], type = "prismatic" }
+[assembly.one]
+crank = 0.3
+arm = "60 deg"
+block = "60 deg"
+"""
 SQUARE = ((0.050, 0.314), (-0.050, 0.314), (-0.050, 0.214), (0.050, 0.214))
 DESKTOP, PHONE = {"width": 1440, "height": 900}, {"width": 390, "height": 844}
 # Soft enough that bending, stretching and inertia are of one magnitude in a random state.

@@ -11,6 +11,7 @@ import pytest
 import scipy
 
 import paraflex as pf
+from conftest import QUICK_RETURN
 from paraflex.errors import InputError, UnreachablePathError
 from paraflex.figures.kinematics import kinematics_of, kinematics_tables
 from paraflex.figures.run_motion import moving_points, point_paths
@@ -216,27 +217,7 @@ def test_a_rocker_that_drives_moves_between_its_limits_of_reach():
 
 def test_a_quick_return_has_its_closed_form_time_ratio(tmp_path):
     file = tmp_path / "quick.toml"
-    file.write_text("""
-name = "quick return"
-[ground]
-O = [0, 0]
-Q = [0, "-150 mm"]
-[body.crank]
-points = { O = [0, 0], A = ["100 mm", 0] }
-[body.arm]
-points = { Q = [0, 0], P = ["450 mm", 0] }
-[body.block]
-points = { A = [0, 0] }
-[joint]
-O = ["ground.O", "crank.O"]
-A = ["crank.A", "block.A"]
-Q = ["ground.Q", "arm.Q"]
-S = { points = ["arm.Q", "block.A"], type = "prismatic" }
-[assembly.one]
-crank = 0.3
-arm = "60 deg"
-block = "60 deg"
-""")
+    file.write_text(QUICK_RETURN)
     model = pf.load(file)
     motion = pf.kinematics(model, "O")
     side = math.asin(100.0 / 150.0)

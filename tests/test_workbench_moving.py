@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import paraflex as pf
+from conftest import QUICK_RETURN
 from paraflex.errors import AssemblyError, InputError
 from paraflex.figures.kinematics import kinematics_of, kinematics_tiles
 from paraflex.files import load
@@ -271,29 +272,10 @@ def test_wrong_drags_are_refused_in_one_line():
             mover.drag(*arguments)
 
 
-QUICK_RETURN = """
-name = "quick return"
-[ground]
-O = [0, 0]
-Q = [0, "-150 mm"]
-[body.crank]
-points = { O = [0, 0], A = ["100 mm", 0] }
-[body.arm]
-points = { Q = [0, 0], P = ["450 mm", 0] }
-[body.block]
-points = { A = [0, 0] }
-[joint]
-O = ["ground.O", "crank.O"]
-A = ["crank.A", "block.A"]
-Q = ["ground.Q", "arm.Q"]
-S = { points = ["arm.Q", "block.A"], type = "prismatic" }
+QUICK_RETURN_DRIVEN = f"""{QUICK_RETURN}
 [prescribed.drive]
 joint = "O"
 speed = 2.0
-[assembly.one]
-crank = 0.3
-arm = "60 deg"
-block = "60 deg"
 """
 
 
@@ -309,7 +291,7 @@ block = "60 deg"
     ],
 )
 def test_a_turn_has_the_numbers_of_kinematics(name, drive, arguments):
-    model = model_of(QUICK_RETURN) if name == "quick_return" else pf.load(name)
+    model = model_of(QUICK_RETURN_DRIVEN) if name == "quick_return" else pf.load(name)
     found, held = turning(model, **arguments), {}
     if name == "five_bar" and drive:
         # The other motor stays at its angle in the assembly.
