@@ -75,7 +75,7 @@ def run(person: Person) -> None:
 
 
 def finished(person: Person) -> None:
-    person.until("workbench.motion.recordings.run?.text === workbench.state.text && workbench.motion.bar.hidden")
+    person.until("workbench.motion.recordings.run?.text === workbench.state.text && workbench.motion.computing.hidden")
 
 
 def number(person: Person, key: str) -> str:

@@ -9,11 +9,12 @@ from paraflex.errors import InputError
 from paraflex.mechanism.quantities import known
 from .adding import ADDING
 from .changing import CHANGING
+from .copying import COPYING
 from .dependents import falling, spelt, thing_of
 from .moving_points import move_point
 from .sheet import Sheet, refusals
 
-_ACTIONS = {**ADDING, **CHANGING, "move-point": move_point}
+_ACTIONS = {**ADDING, **CHANGING, **COPYING, "move-point": move_point}
 # Tables whose entries about deleted members go without a word.
 _BOOKKEEPING = ("assembly", "start")
 
@@ -99,8 +100,6 @@ def _note(before: Sheet, after: Sheet, action: Mapping[str, Any]) -> str:
     if action["kind"] == "delete":
         gone = [one["name"] for one in what_goes(before.text, action.get("names", ()))]
     if action["kind"] == "retype":
-        lost = [
-            (table, name) for table in before.data for name in before.names(table) if name not in after.names(table)
-        ]
-        gone = [f"{table}.{name}" for table, name in lost if table not in ("assembly", "study")]
+        tables = [table for table in before.data if table not in ("assembly", "study")]
+        gone = [f"{table}.{name}" for table in tables for name in before.names(table) if name not in after.names(table)]
     return f"also deleted: {', '.join(gone)}" if gone else ""

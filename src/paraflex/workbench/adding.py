@@ -9,7 +9,7 @@ from paraflex.driven.ranges import freedoms_at
 from paraflex.errors import InputError, NumericalError
 from paraflex.mechanism.quantities import known
 from .changing import rename
-from .linking import add_ground, add_joint, add_link, add_point, add_slider
+from .linking import add_ground, add_joint, add_link, add_point, add_slider, retype
 from .sheet import Action, Done, Sheet, check_name
 
 _LUMP = {"mass": "0.1 kg", "inertia": "20 kg mm^2"}
@@ -48,11 +48,12 @@ def add_mode(sheet: Sheet, action: Action) -> Done:
 
 def add_drive(sheet: Sheet, action: Action) -> Done:
     """Add a motion of constant speed at a joint; a model without a path runs for one turn by default."""
-    joint, given, duration = _undriven(sheet, action), action.get("speed"), 1.0
+    joint = _undriven(sheet, action)
     # A speed in its unit is a whole turn in the duration, to the last digit.
-    speed = float(given) if given else ("100 mm/s" if _slides(sheet, joint) else "60 rpm")
-    if given and not _slides(sheet, joint):
-        duration = abs(2.0 * pi / float(given))
+    speed, duration = ("100 mm/s" if _slides(sheet, joint) else "60 rpm"), 1.0
+    if action.get("speed"):
+        speed = float(action["speed"])
+        duration = 1.0 if _slides(sheet, joint) else abs(2.0 * pi / speed)
     name = sheet.free_name(action, "prescribed", "drive")
     sheet = sheet.table(("prescribed", name), {"joint": joint, "speed": speed})
     if not sheet.data.get("study", {}).keys() & {"duration", "path", "paths"}:
@@ -207,5 +208,5 @@ ADDING: dict[str, Adding] = {
     "add-point": add_point, "add-motor": add_motor, "add-mode": add_mode, "add-drive": add_drive,
     "add-gear": add_gear, "add-spring": add_spring, "add-damper": add_damper, "add-load": add_load,
     "add-lump": add_lump, "add-sensor": add_sensor, "set-effector": set_effector, "add-path": add_path,
-    "add-gravity": add_gravity,
+    "add-gravity": add_gravity, "retype": retype,
 }  # fmt: skip

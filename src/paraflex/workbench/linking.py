@@ -5,10 +5,13 @@ from math import cos, dist, sin
 from typing import Any
 
 from paraflex.errors import InputError
+from paraflex.files.fields import value_at
 from paraflex.mechanism import JOINT_KINDS, Joint
 from paraflex.mechanism.joints import GROUND
 from paraflex.mechanism.poses import Pose
 from paraflex.mechanism.quantities import known
+from .changing import without_things
+from .dependents import replaced, spelt, uses
 from .sheet import XY, Action, Done, Sheet, check_name, direction, placed, tidy, without_spare_places
 
 _SECTION = {"width": "30 mm", "thickness": "5 mm"}
@@ -53,7 +56,7 @@ def add_joint(sheet: Sheet, action: Action) -> Done:
     known(kind, list(JOINT_KINDS), "type", "kind of joint")
     if b.startswith(f"{GROUND}."):
         a, b = b, a
-    fields = fields_of(sheet, action, JOINT_KINDS[kind], a, b)
+    fields = _fields_of(sheet, action, JOINT_KINDS[kind], a, b)
     name = sheet.free_name(action, "joint", "joint") if action.get("name") else _joint_name(sheet, b)
     if kind == "revolute":
         sheet = sheet.put(("joint", name), [a, b])
@@ -61,6 +64,31 @@ def add_joint(sheet: Sheet, action: Action) -> Done:
         sheet = sheet.table(("joint", name), {"type": kind, "points": [a, b]} | fields)
     bodies = {ref.partition(".")[0] for ref in (a, b)}
     return placed(before, without_spare_places(sheet, bodies)), f"joint.{name}"
+
+
+def retype(sheet: Sheet, action: Action) -> Done:
+    """Make a joint one of another type; what drives or loads it stays, if the joint still moves in that way."""
+    name, kind = str(action.get("joint")), str(action.get("type"))
+    known(kind, list(JOINT_KINDS), "type", "kind of joint")
+    joint = next((one for one in sheet.joints if one.name == name), None)
+    if joint is None:
+        raise sheet.problem or InputError("no such joint", field="joint", value=name, remedy="choose a joint")
+    a, b, thing = str(joint.a), str(joint.b), ("joint", name)
+    table, old = {"type": kind, "points": [a, b]}, value_at(sheet.data, thing)
+    table |= _fields_of(sheet, action, JOINT_KINDS[kind], a, b)
+    after = sheet
+    if isinstance(old, list):
+        after = sheet.put(thing, [a, b] if kind == "revolute" else table)
+    else:
+        for key in [key for key in old if key not in table]:
+            after = after.without((*thing, key))
+        for key in [key for key in table if table[key] != old.get(key)]:
+            after = after.put((*thing, key), table[key])
+    if after.problem is not None:
+        users = {use.place[:2] for use in uses(after.data) if replaced(use, thing, "") is not None} - {thing}
+        after = without_things(after, list(users)) if users else after
+    bodies = {joint.a.body, joint.b.body}
+    return placed(sheet, without_spare_places(after, bodies)), spelt(thing)
 
 
 def add_slider(sheet: Sheet, action: Action) -> Done:
@@ -103,7 +131,7 @@ def add_point(sheet: Sheet, action: Action) -> Done:
     return sheet.put(("body", body, "points", name), local[0] if on_axis else tidy(local)), f"{body}.{name}"
 
 
-def fields_of(sheet: Sheet, action: Action, kind: type[Joint], a: str, b: str) -> dict[str, float]:
+def _fields_of(sheet: Sheet, action: Action, kind: type[Joint], a: str, b: str) -> dict[str, float]:
     """Return the directions of a joint as its points are in the picture, without those that are zero."""
     shown = action.get("assembly") or sheet.shown
     start, end = sheet.place(a, shown), sheet.place(b, shown)

@@ -56,7 +56,7 @@ def with_starts(sheet: Sheet, turns: Mapping[str, float], travels: Mapping[str, 
 
     Laws of the time stay as they are.
     """
-    joints = {joint.name: joint for joint in sheet.joints}
+    joints, travels = {joint.name: joint for joint in sheet.joints}, travels or {}
     for name in sheet.names("prescribed"):
         place = ("prescribed", name, "angle")
         joint = joints.get(str(value_at(sheet.data, ("prescribed", name, "joint"))))
@@ -65,10 +65,9 @@ def with_starts(sheet: Sheet, turns: Mapping[str, float], travels: Mapping[str, 
             with suppress(InputError):
                 sheet = with_number(sheet, place, sheet.number(place) + change)
         place = ("prescribed", name, "displacement")
-        if joint is not None and value_at(sheet.data, place) is not None and joint.name in (travels or {}):
+        if joint is not None and joint.name in travels and value_at(sheet.data, place) is not None:
             with suppress(InputError):
-                if not isclose(sheet.number(place), float((travels or {})[joint.name]), abs_tol=_EQUAL):
-                    sheet = with_number(sheet, place, float((travels or {})[joint.name]))
+                sheet = with_number(sheet, place, float(travels[joint.name]))
     return sheet
 
 

@@ -74,9 +74,8 @@ def _of_motion(model: Model, freedoms: int) -> Message | None:
         drives = f"{freedoms} motors" if freedoms > 1 else "a motor, or the crank that turns"
         return _not(f"Choose what moves it: {drives}", [], "motor" if freedoms > 1 else "drive")
     if massless is not None:
-        kind = "can be moved by hand" if freedoms else "can be bent by a force"
-        kind = "can be moved by its drive" if mechanism.prescribed else kind
-        return _not(f"It {kind}; for a run, {massless} needs a mass", ["body", massless, "mass"])
+        how = "moved by its drive" if mechanism.prescribed else "moved by hand" if freedoms else "bent by a force"
+        return _not(f"It can be {how}; for a run, {massless} needs a mass", ["body", massless, "mass"])
     return _pull(model) if pulled else None
 
 

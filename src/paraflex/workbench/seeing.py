@@ -75,8 +75,12 @@ class Seeing:
 
     def holds(self, q: Array, mode: str = "") -> bool:
         """Return whether motors of a mode and prescribed motions hold all degrees of freedom in a rigid pose (n,)."""
-        free, joints = self._free(q), self._held(mode)
-        return _rank(self._scaled(joint_rows(self._rigid, joints, q)) @ free) == free.shape[1]
+        free = self._free(q)
+        return self._driven(q, mode, free) == free.shape[1]
+
+    def _driven(self, q: Array, mode: str, free: Array) -> int:
+        """Return how many of the free motions the motors of a mode and prescribed motions drive."""
+        return _rank(self._scaled(joint_rows(self._rigid, self._held(mode), q)) @ free)
 
     def quick(self, q: Array, mode: str) -> dict[str, Any]:
         """Return the numbers of a rigid pose (n,) that follow a drag.
@@ -92,31 +96,12 @@ class Seeing:
         motors, free = self._motors(mode), self._free(q)
         by_motors, by_task = self._moved(q, motors, free)
         found = {"freedoms": free.shape[1], "mode": mode, "drives": int(_rank(by_motors))}
-        found |= self._singular(q, motors) | {"condition": _condition(by_task, by_motors)}
-        if found["condition"] is None:
-            why["condition"] = self._no_condition(by_task, by_motors)
+        found |= self._singular(q, motors)
+        found["condition"], reason = _condition(by_task, by_motors)
+        if reason:
+            why["condition"] = reason
         found["torques"] = self._holding(q, free, by_motors, [*motors, *self._drives], why)
         return {**found, "why": why}
-
-    def _no_condition(self, by_task: Array | None, by_motors: Array) -> str:
-        """Return the reason why there is no condition number."""
-        freedoms = by_motors.shape[1]
-        if by_task is None:
-            return "no end-effector"
-        if not freedoms:
-            return "no degree of freedom"
-        if not by_motors.size:
-            return "no motors"
-        if len(by_task) != freedoms:
-            many = "1 degree" if freedoms == 1 else f"{freedoms} degrees"
-            task = "coordinate" if len(by_task) == 1 else "coordinates"
-            return f"the task has {len(by_task)} {task}, the mechanism {many} of freedom"
-        if np.linalg.matrix_rank(by_task) < freedoms:
-            return "the end-effector is in a singular position (serial, type I)"
-        driven = _rank(by_motors)
-        if len(by_motors) < freedoms:
-            return f"the motors drive {driven} of {freedoms} degrees of freedom"
-        return "the motors are in a singular position (parallel, type II)"
 
     def _moved(self, q: Array, motors: Sequence[str], free: Array) -> tuple[Array, Array | None]:
         """Return the velocities of motors and drives, and of the task, by the free motions."""
@@ -235,8 +220,7 @@ class Seeing:
         """Return the modes with what their motors drive at a pose."""
         free, out = self._free(q), []
         for mode in self._mechanism.modes:
-            joints = [*(self._joint[name] for name in mode.motors), *self._drives]
-            driven, freedoms = _rank(self._scaled(joint_rows(self._rigid, joints, q)) @ free), free.shape[1]
+            driven, freedoms = self._driven(q, mode.name, free), free.shape[1]
             lacks = f"drives {driven} of {freedoms} degrees of freedom" if driven < freedoms else ""
             out.append({"name": mode.name, "motors": list(mode.motors), "drives": driven, "lacks": lacks})
         return out
@@ -303,12 +287,24 @@ def _ratio(rows: Array, count: int, bodies: int) -> Array:
     return sizes[..., count - 1] / np.maximum(sizes[..., 0], _SMALL / np.sqrt(bodies))
 
 
-def _condition(by_task: Array | None, by_motors: Array) -> float | None:
-    """Return the condition number of the effort in the task per torque; None without a task that fits the freedoms."""
-    if by_task is None or by_task.shape[0] != by_task.shape[1] or not by_motors.size:
-        return None
-    if np.linalg.matrix_rank(by_task) < by_task.shape[0]:
-        return None
+def _condition(by_task: Array | None, by_motors: Array) -> tuple[float | None, str]:
+    """Return the condition number of the effort in the task per torque; or None, and the reason."""
+    freedoms = by_motors.shape[1]
+    if by_task is None:
+        return None, "no end-effector"
+    if not freedoms:
+        return None, "no degree of freedom"
+    if not by_motors.size:
+        return None, "no motors"
+    if len(by_task) != freedoms:
+        many = "1 degree" if freedoms == 1 else f"{freedoms} degrees"
+        task = "coordinate" if len(by_task) == 1 else "coordinates"
+        return None, f"the task has {len(by_task)} {task}, the mechanism {many} of freedom"
+    if np.linalg.matrix_rank(by_task) < freedoms:
+        return None, "the end-effector is in a singular position (serial, type I)"
+    if len(by_motors) < freedoms:
+        return None, f"the motors drive {_rank(by_motors)} of {freedoms} degrees of freedom"
     sizes = np.linalg.svd(np.linalg.solve(by_task.T, by_motors.T), compute_uv=False)
-    freedoms = by_task.shape[0]
-    return float(sizes[0] / sizes[freedoms - 1]) if sizes.size >= freedoms and sizes[freedoms - 1] > 0.0 else None
+    if not sizes[freedoms - 1] > 0.0:
+        return None, "the motors are in a singular position (parallel, type II)"
+    return float(sizes[0] / sizes[freedoms - 1]), ""

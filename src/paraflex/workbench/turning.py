@@ -105,9 +105,10 @@ def _wished(model: Model, assembly: str | None, wishes: dict[str, Any]) -> dict[
     if drive is None:
         return {**wishes, "drive": next(iter(joints))} if len(joints) == freedoms == 1 else wishes
     others = [one.joint for one in (*model.mechanism.prescribed, *model.mechanism.motors) if one.joint != drive]
-    held, system = dict.fromkeys(others), build_system(mechanism)
+    held = dict.fromkeys(others)
     if len(held) != freedoms - 1 or not held:
         return wishes
+    system = build_system(mechanism)
     return {**wishes, "held": {name: joint_value(system, name, pose) for name in held}}
 
 

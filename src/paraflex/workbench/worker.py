@@ -140,8 +140,8 @@ def _answer(request: dict[str, Any], send: Send, stale: Stale, *, only_coarse: b
     compile_kernels_for(model.mechanism, lambda text: send({"state": "running", "doing": text, "share": 0.0}))
     modes, path = tuple(request.get("modes") or ()), request.get("path") or None
     of = request.get("source"), len(model.mechanism.bodies), modes or model.study.modes
-    previews = request.get("preview", True) and (only_coarse or _taken.get(of, _SHORT) >= _SHORT)
-    for coarse in (True, False)[: 1 if only_coarse else 2] if previews else (False,):
+    is_long = request.get("preview", True) and _taken.get(of, _SHORT) >= _SHORT
+    for coarse in [True] if only_coarse else [True, False] if is_long else [False]:
         started, watch = time.perf_counter(), _watching(send, stale, "a first look" if coarse else "the run")
         found = computed(model, modes, path, coarse=coarse, on_progress=watch)
         if coarse and not only_coarse and time.perf_counter() - started < _QUICK:

@@ -45,7 +45,7 @@ export class Motion {
     this.runner = button("▶ Run", "Compute the flexible motion in all modes of the study", () => this.run(true), { class: "main" });
     this.doing = element("span", { class: "doing" });
     this.stopper = button("■ Stop", "Stop the run", () => this.bench.link.ask("cancel").catch(() => null));
-    this.bar = element("div", { class: "progress", role: "progressbar", "aria-label": "Progress of the run", hidden: true }, element("i", {}));
+    this.bar = element("div", { class: "progress", role: "progressbar", "aria-label": "Progress of the run" }, element("i", {}));
     this.computing = element("span", { class: "computing", hidden: true }, this.bar, this.doing, this.stopper);
     this.chips = withArrows(element("div", { class: "chips", role: "radiogroup", "aria-label": "Motion that is shown" }));
     this.results = element("p", { class: "results" });
@@ -291,7 +291,7 @@ export class Motion {
     this.turner.disabled = this.runner.disabled = !this.bench.state.picture;
     if (first) return;
     this.stop();
-    this.computing.hidden = this.bar.hidden = true;
+    this.computing.hidden = true;
     this.bench.parts.dock.classList.toggle("old", !!this.recording);
     this.due = true;
   }
@@ -321,12 +321,12 @@ export class Motion {
     this.asked = asked;
     this.progress("begins", 0);
     const found = await (asked ? this.ask("run") : this.bench.link.ask("run").catch(() => null));
-    if (!found) this.computing.hidden = this.bar.hidden = true;
+    if (!found) this.computing.hidden = true;
     else this.number = Math.max(this.number, found.run ?? 0);
   }
 
   progress(text, share) {
-    this.computing.hidden = this.bar.hidden = false;
+    this.computing.hidden = false;
     this.doing.textContent = text;
     this.bar.firstChild.style.width = `${Math.round(100 * share)}%`;
     this.bar.title = `${text} ${Math.round(100 * share)} %`;
@@ -339,13 +339,13 @@ export class Motion {
     const newer = event.run > this.number || this.of !== event.run;
     this.number = event.run;
     if (event.state === "running") { this.progress(event.doing, event.share ?? 0); return; }
-    if (event.state === "cancelled") { this.computing.hidden = this.bar.hidden = true; return; }
-    if (event.state === "error") { this.computing.hidden = this.bar.hidden = true; this.tell([event.text], "error"); if (this.asked) this.bench.say(event.text, "error"); return; }
+    if (event.state === "cancelled") { this.computing.hidden = true; return; }
+    if (event.state === "error") { this.computing.hidden = true; this.tell([event.text], "error"); if (this.asked) this.bench.say(event.text, "error"); return; }
     const { text } = this.bench.state, recording = await Recording.ofRun(event, text);
     if (event.run !== this.number || text !== this.bench.state.text) return;
     if (newer && this.recordings.run && this.recordings.run.text !== text) this.before = this.recordings.run;
     this.of = event.run;
-    if (event.state === "done") this.computing.hidden = this.bar.hidden = true;
+    if (event.state === "done") this.computing.hidden = true;
     const { tools } = this.bench, free = this.asked || (!tools.held && tools.tool.name === "select" && !(this.kind === "turn" && this.playing));
     if (free) this.take(recording, { play: this.playing || event.state === "preview" || newer });
     else { this.recordings.run = recording; if (this.kind !== "turn") this.choose("run", this.kind ? this.index : -1, false); else this.fillChips(); }
