@@ -24,6 +24,7 @@ GOALS = {"updates": 30.0, "frames": 60.0, "length": 0.050, "run five_bar": 0.5, 
 # A place in the middle of a link's length, and how the mouse drags the end-effector: steps, radius [px], seconds.
 LENGTHS = {"five_bar": (["parameters", "l1"], 0.25), "raparm_i": (["body", "link1", "length"], 0.25)}
 STEPS, RADIUS = 240, 40.0
+WARM = 20_000  # [ms]
 # Replies are counted in the page, where they arrive.
 COUNT = """() => {
     const { link, sheet } = workbench, ask = link.ask.bind(link);
@@ -124,7 +125,8 @@ def main() -> None:
                 page = browser.new_page(viewport={"width": 1400, "height": 1000})
                 page.goto(re.search(r"http://\S+", process.stdout.readline())[0])  # type: ignore[index]
                 page.wait_for_function("() => workbench.state.picture && workbench.sheet.frames > 2")
-                page.wait_for_timeout(3000)
+                # Until both processes of runs are warm, they take the processors from what is measured.
+                page.wait_for_timeout(WARM)
                 found[model] = measured(page, model, asked.repeats)
                 page.close()
         browser.close()
